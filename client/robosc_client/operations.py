@@ -80,7 +80,7 @@ def synthesize(
     deadline_s: float | None = None,
     on_progress: OnProgress = ignored,
 ) -> Operation[Synthesis]:
-    """Synthesize and certify a supervisor; `is_modular` synthesizes automata in modules."""
+    """Synthesize and certify a supervisor; with `is_modular` in modules."""
     task = Synthesize(loaded(model), options, is_modular)
     return _streaming_task("Synthesize", task, SynthesisReader, deadline_s, on_progress)
 
@@ -92,6 +92,7 @@ def generate(
     options: SynthesisOptions = DEFAULT_OPTIONS,
     *,
     initial: str | None = None,
+    is_modular: bool = False,
     deadline_s: float | None = None,
     on_progress: OnProgress = ignored,
 ) -> Operation[Generation]:
@@ -103,10 +104,11 @@ def generate(
         generation: Choices about the files.
         options: Options for making the supervisor.
         initial: Description of the state in which automata begin that may begin in several, such as `tank.level = 1`.
+        is_modular: True for a synthesis in modules.
         deadline_s: See the class.
         on_progress: See the class.
     """
-    task = Generate(loaded(model), target, generation, options, initial)
+    task = Generate(loaded(model), target, generation, options, initial, is_modular)
     return _streaming_task("Generate", task, lambda: GenerationReader(target), deadline_s, on_progress)
 
 
@@ -132,6 +134,8 @@ def verify(
     options: SynthesisOptions | None = None,
     maximum_states: int | None = None,
     is_strict: bool = False,
+    controller: bool = False,
+    as_is: bool = False,
     deadline_s: float | None = None,
     on_progress: OnProgress = ignored,
 ) -> Operation[Verification]:
@@ -145,6 +149,9 @@ def verify(
         options: Options for making the supervisor, and the deployment that a given one must have; None: its own.
         maximum_states: States up to which a given supervisor is searched one by one; None: 1,000,000.
         is_strict: True if a given supervisor passes only if permissiveness was checked, too.
+        controller: True if automata are also checked for bounded and finite response, confluence and nonblocking under
+            control.
+        as_is: True if nothing is synthesized: automata are verified as they stand.
         deadline_s: See the class.
         on_progress: See the class.
     """
@@ -162,8 +169,14 @@ def verify(
             maximum_nodes=chosen.maximum_nodes,
             maximum_states=maximum_states,
             is_strict=is_strict,
+            controller=controller,
+            as_is=as_is,
         )
-    elif properties or property_files or supervisor is not None or options or maximum_states is not None or is_strict:
+    elif (
+        any((properties, property_files, options, is_strict, controller, as_is))
+        or supervisor is not None
+        or maximum_states is not None
+    ):
         raise TypeError("a task contains all options: give either a task, or a model with options")
     return _streaming_task("Verify", task, VerificationReader, deadline_s, on_progress)
 
@@ -188,6 +201,7 @@ def explain(
     event: str | None = None,
     state: str | None = None,
     after: str | None = None,
+    is_modular: bool = False,
     deadline_s: float | None = None,
     on_progress: OnProgress = ignored,
 ) -> Operation[Explained]:
@@ -201,11 +215,12 @@ def explain(
         event: The event to explain; None: all of them, and warnings.
         state: Description of a state in which to explain what can happen, such as `Door.closed, Lift.n = 2`.
         after: Run after which to explain what can happen, such as `open, jam.response`.
+        is_modular: True if the events of a robot are explained module by module.
         deadline_s: See the class.
         on_progress: See the class.
     """
     bundle = loaded(model)
-    task = Explain(model=bundle, options=options, event=event, state=state, after=after)
+    task = Explain(model=bundle, options=options, event=event, state=state, after=after, is_modular=is_modular)
     return _streaming_task("Explain", task, lambda: ExplanationReader(bundle), deadline_s, on_progress)
 
 

@@ -24,7 +24,7 @@ class Synthesize:
     Attributes:
         model: The model and its libraries, or automata.
         options: Options for making the supervisor; of automata, those about the engine.
-        is_modular: True if automata are to be synthesized in modules.
+        is_modular: True for a synthesis in modules.
     """
 
     model: Bundle
@@ -38,6 +38,7 @@ class Generate:
 
     Attributes:
         initial: Description of the state in which automata begin that may begin in several; None: as the model says.
+        is_modular: True for a synthesis in modules.
     """
 
     model: Bundle
@@ -45,6 +46,7 @@ class Generate:
     generation: GenerateOptions = DEFAULT_GENERATION
     options: SynthesisOptions = DEFAULT_OPTIONS
     initial: str | None = None
+    is_modular: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +79,9 @@ class Verify:
         maximum_nodes: As in SynthesisOptions.
         maximum_states: States up to which a given supervisor is searched one by one; None: 1,000,000.
         is_strict: True if a given supervisor passes only if permissiveness was checked, too.
+        controller: True if automata are also checked for bounded and finite response, confluence and nonblocking under
+            control.
+        as_is: True if nothing is synthesized: automata are verified as they stand.
     """
 
     model: Bundle
@@ -89,6 +94,8 @@ class Verify:
     maximum_nodes: int | None = None
     maximum_states: int | None = None
     is_strict: bool = False
+    controller: bool = False
+    as_is: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,6 +108,7 @@ class Explain:
         event: The event to explain; None: none in particular.
         state: Description of a state in which to explain what can happen, such as `Door.closed, Lift.n = 2`.
         after: Run after which to explain what can happen, such as `open, jam.response`.
+        is_modular: True if the events of a robot are explained module by module.
     """
 
     model: Bundle
@@ -108,6 +116,7 @@ class Explain:
     event: str | None = None
     state: str | None = None
     after: str | None = None
+    is_modular: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ from robosc.automata.structure import (
     InputVariable,
     Role,
     System,
+    as_controlled,
     composed,
     disables,
 )
@@ -38,6 +39,7 @@ __all__ = [
     "Semantics",
     "System",
     "SystemPlaces",
+    "as_controlled",
     "check_system",
     "composed",
     "disables",

@@ -28,12 +28,14 @@ class SystemPlaces(msgspec.Struct, frozen=True):
         conditions: Places of `System.conditions`, in their order.
         invariants: Places of `System.invariants`.
         plant_conditions: Places of `System.plant_conditions`.
+        events: Place of the declaration of each event, by its name.
     """
 
     automata: Mapping[str, Location] = msgspec.field(default_factory=dict)
     conditions: tuple[Location, ...] = ()
     invariants: tuple[Location, ...] = ()
     plant_conditions: tuple[Location, ...] = ()
+    events: Mapping[str, Location] = msgspec.field(default_factory=dict)
 
 
 class CheckedSystem(msgspec.Struct, frozen=True):

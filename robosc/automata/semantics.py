@@ -267,12 +267,17 @@ class Semantics:
     States are tuples in the order of `subjects(system)`. What asks for the steps of a state raises
     `TooManyChoicesError` where received data has more than `MAXIMUM_CHOICES` values that matter together.
 
+    Args:
+        system: The system.
+        text: Function that writes a condition of the system, for the reasons of `bad_reason`.
+
     Attributes:
         system: The system.
     """
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, text: Callable[[Expression], str] = expression_text) -> None:
         self.system = system
+        self._text = text
         self._places = {subject: place for place, subject in enumerate(subjects(system))}
         self._marked = tuple((self._places[Subject(item.name)], item.marked) for item in system.automata)
         self._rules = {event.name: self._rule(event) for event in system.events}
@@ -365,7 +370,7 @@ class Semantics:
         """Return the reason why a state is bad, in words, or None if it is not."""
         for number, invariant in enumerate(self._invariants):
             if invariant(state, NO_DATA) is not True:
-                return f"'{expression_text(self.system.invariants[number])}' is not true"
+                return f"'{self._text(self.system.invariants[number])}' is not true"
         for rule in self._uncontrollable:
             outcome = rule.outcome(state)
             if outcome.is_possible and not outcome.meets_condition:

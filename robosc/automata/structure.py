@@ -12,7 +12,7 @@ A is in location l, and `Received(path)` is the event's input of that path.
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
-from robosc.expressions import TRUE, Expression, PathStep, Type, Unary, Value
+from robosc.expressions import TRUE, Expression, PathStep, Type, Unary, Value, conjunction
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,6 +185,16 @@ class System:
             if event.name == name:
                 return event
         raise KeyError(name)
+
+
+def as_controlled(system: System) -> System:
+    """Return automata whose requirements are taken for a supervisor that was made already.
+
+    No state is one that a supervisor excludes, so the system begins in none either.
+    """
+    if system.is_controlled:
+        return system
+    return replace(system, initial=conjunction(system.initial, *system.invariants), is_controlled=True)
 
 
 def composed(system: System) -> System:

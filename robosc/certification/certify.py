@@ -1,17 +1,21 @@
 """The certificate: the result of the independent verifier for a supervisor that has just been synthesized."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping, Sequence
+
+from msgspec.structs import replace
 
 from robosc._version import __version__
+from robosc.automata.decision import Decision
 from robosc.automata.semantics import Semantics
+from robosc.automata.structure import System
 from robosc.errors import InternalError
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
 from robosc.supervisor import Certificate, CheckResult
 from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import SynthesisResult
-from robosc.verification import CheckOutcome, Limits, Verification, VerificationReport, verify
+from robosc.verification import CheckOutcome, Limits, Verification, VerificationReport, verify, verify_modules
 
 
 def certify(
@@ -21,6 +25,8 @@ def certify(
     deployment: Deployment,
     limits: Limits,
     *,
+    modules: Sequence[Collection[str]] = (),
+    expected_states: int = 0,
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[str], None] = lambda message: None,
 ) -> Certificate:
@@ -32,6 +38,8 @@ def certify(
         bundle: The texts that they were made from.
         deployment: Intended deployment of the supervisor.
         limits: Limits of the check.
+        modules: Names of the automata of each module, for a modular synthesis.
+        expected_states: States that the system has at most, where the result does not count them.
         should_stop: Function called now and then; once it returns true, the work ends.
         on_progress: Function called now and then with the progress of the work, in one short line.
 
@@ -45,14 +53,15 @@ def certify(
             part.system,
             state_predicates(part.system, made.added),
             limits,
-            expected_states=made.statistics.states,
+            expected_states=made.statistics.states or expected_states,
             engine=made.statistics.engine,
             semantics=part,
             should_stop=should_stop,
             on_progress=on_progress,
         )
         found = report.verification
-        if found.failures or found.states not in (None, made.statistics.states):
+        counted = {None, made.statistics.states} if made.statistics.states else {found.states}
+        if found.failures or found.states not in counted:
             raise InternalError(
                 f"the verifier refuses the supervisor: {found.message or 'another number of states'}"
                 + (f" after {', '.join(found.trace)}" if found.trace else "")
@@ -63,6 +72,9 @@ def certify(
         report = _together([report_of(Semantics(part), made) for part, made in result.parts])
     else:
         report = report_of(semantics, result)
+    if modules and not result.parts:
+        added = state_predicates(semantics.system, result.added)
+        report = with_modules(report, semantics.system, added, modules, limits, should_stop=should_stop)
     found = report.verification
     return Certificate(
         engine_version=__version__,
@@ -73,9 +85,51 @@ def certify(
         controllable=_result(found.controllable),
         nonblocking=_result(found.nonblocking),
         maximally_permissive=_result(found.maximally_permissive),
-        states=str(result.statistics.states),
+        states=str(result.statistics.states or found.states or 0),
         transitions=None if found.transitions is None else str(found.transitions),
     )
+
+
+def with_modules(
+    report: VerificationReport,
+    system: System,
+    added: Mapping[str, Decision],
+    modules: Sequence[Collection[str]],
+    limits: Limits,
+    *,
+    should_stop: Callable[[], bool] = lambda: False,
+) -> VerificationReport:
+    """Return a report with what modules show of what was not checked of the whole.
+
+    Args:
+        report: Report on the whole system.
+        system: Plants and event conditions.
+        added: For each event to which the supervisor adds a condition, that condition.
+        modules: Names of the automata of each module.
+        limits: Limits of the check.
+        should_stop: Function called now and then; once it returns true, the work ends.
+
+    Raises:
+        SynthesisCancelled: `should_stop` became true.
+    """
+    found = report.verification
+    open_ = CheckOutcome.NOT_CHECKED
+    if found.failures or open_ not in (found.safe, found.maximally_permissive):
+        return report
+    shown = verify_modules(system, added, modules, limit=limits.recomputed, should_stop=should_stop)
+    free = {event.name for event in system.events if not event.is_controllable}
+    # A supervisor that adds nothing to uncontrollable events disables none.
+    controllable = open_ if free.intersection(added) else CheckOutcome.PASSED
+    verification = replace(
+        found,
+        safe=shown.safe if found.safe is open_ else found.safe,
+        controllable=controllable if found.controllable is open_ else found.controllable,
+        maximally_permissive=(
+            shown.maximally_permissive if found.maximally_permissive is open_ else found.maximally_permissive
+        ),
+    )
+    method = report.method.removesuffix("; permissiveness not recomputed")
+    return VerificationReport(verification, f"{method}; {shown.method}")
 
 
 def _together(reports: list[VerificationReport]) -> VerificationReport:

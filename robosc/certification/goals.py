@@ -6,7 +6,8 @@ from typing import Any
 
 from robosc.conditions.goals import aims_in_words, assumption_text
 from robosc.conditions.rendering import in_words
-from robosc.explanation.notation import events_text, requirement_text, value_text
+from robosc.conditions.requirements import requirement_text
+from robosc.explanation.notation import events_text, value_text
 from robosc.explanation.parts import Part
 from robosc.expressions import Value
 from robosc.model.places import Places

@@ -4,9 +4,11 @@ The command line, the service and the tests all call `make_supervisor`, so the s
 everywhere.
 """
 
+import dataclasses
 from collections.abc import Callable
 from contextlib import suppress
 from enum import StrEnum
+from math import prod
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -32,14 +34,14 @@ from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model
 from robosc.source import Bundle
 from robosc.strategies.findings import layer_goal_findings
-from robosc.supervisor import CheckResult, Supervisor
+from robosc.supervisor import CheckResult, Strategy, SupervisedModule, Supervisor
 from robosc.synthesis import (
     EngineOptions,
     Statistics,
     SynthesisProgress,
+    SynthesisResult,
     SynthesisStatus,
     findings,
-    questions_about,
     synthesize_in_parts,
 )
 from robosc.verification import DEFAULT_STATES, CheckOutcome, Limits
@@ -47,9 +49,13 @@ from robosc.verification import DEFAULT_STATES, CheckOutcome, Limits
 if TYPE_CHECKING:
     from robosc.certification.goals import GoalExplanation
     from robosc.explanation import EmptyExplanation
+    from robosc.modular.robots import RobotSynthesis
 
 CANCEL_REASON = "no supervisor is made, because it would have to forbid a cancel that must be possible"
 """Reason why there is no supervisor where it forbids what its executor asks for."""
+
+MAXIMUM_NAMES = 20
+"""Maximum number of components that are named for a module without a supervisor."""
 
 LIVELOCK_REASON = "no supervisor is made, because silent steps never end (--allow-livelock overrides this)"
 
@@ -83,6 +89,27 @@ class SynthesisOutcome(msgspec.Struct, frozen=True):
     reason: str = ""
     explanation: "EmptyExplanation | GoalExplanation | None" = None
     accepted: tuple[Diagnostic, ...] = ()
+
+
+@dataclasses.dataclass(frozen=True)
+class _Result:
+    """The outcome of synthesis.
+
+    Attributes:
+        result: The supervisor, or why there is none.
+        words: The automata with the words for them; without a supervisor perhaps only those of a module that has none.
+        expected_states: States that the system has at most, where they were not counted.
+        modules: The modules of a modular synthesis.
+        robot: The robot in modules, for a modular synthesis with a supervisor.
+        effort: Most nodes of diagrams that the whole system can be expected to need.
+    """
+
+    result: SynthesisResult
+    words: "explanations.ModelWords"
+    expected_states: int
+    effort: int
+    modules: tuple[SupervisedModule, ...] = ()
+    robot: "RobotSynthesis | None" = None
 
 
 class SynthesisProblem(msgspec.Struct, frozen=True):
@@ -137,6 +164,7 @@ def make_supervisor(
     verify_limit: int = DEFAULT_STATES,
     allow_livelock: bool = False,
     only_shown: bool = False,
+    is_modular: bool = False,
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> SynthesisOutcome:
@@ -150,6 +178,7 @@ def make_supervisor(
         allow_livelock: True if a supervisor is made even if silent steps of its executor never end.
         only_shown: True if the supervisor is not to be executed: then one is made even if it forbids a cancel that must
             be possible.
+        is_modular: True for a modular synthesis: for robots of many components, of which each requirement is about few.
         should_stop: Function called again and again; once it returns true, the work ends.
         on_progress: Function called with the progress of the work.
 
@@ -173,8 +202,11 @@ def make_supervisor(
         on_progress,
         allow_livelock=allow_livelock,
         only_shown=only_shown,
+        is_modular=is_modular,
     )
     is_judged = outcome.status is OutcomeStatus.SUPERVISOR and deployment is Deployment.CONTROLLER
+    # Several modules do not find all that the whole would.
+    is_judged = is_judged and (outcome.supervisor is None or len(outcome.supervisor.modules) < 2)
     diagnostics, accepted = accept(bundle, outcome.diagnostics, lambda code: is_judged and code in AFTER_SYNTHESIS)
     return replace(outcome, diagnostics=diagnostics, accepted=sorted_diagnostics((*problem.accepted, *accepted)))
 
@@ -190,33 +222,29 @@ def _supervised(
     *,
     allow_livelock: bool,
     only_shown: bool,
+    is_modular: bool,
 ) -> SynthesisOutcome:
     """Synthesize the supervisor of a model without errors; the arguments are those of `make_supervisor`."""
     model, places, system = problem.model, problem.places, problem.system.automata
 
-    def report(progress: SynthesisProgress) -> None:
+    def report(progress: SynthesisProgress | str) -> None:
         on_progress(Progress("synthesis", str(progress)))
 
-    result = synthesize_in_parts(
-        system,
-        engine=engine,
-        questions=questions_about(model, system, deployment),
-        should_stop=should_stop,
-        on_progress=report,
-    )
+    made = (_in_modules if is_modular else _as_a_whole)(problem, deployment, engine, should_stop, report)
+    result = made.result
     if result.status is SynthesisStatus.EMPTY:
         reason = f"no supervisor exists: {result.reason}"
         explanation = None
         # The verdict, no supervisor, holds whatever the limit of nodes.
         with suppress(NodeLimitError):
             explanation = explanations.explain_empty(
-                explanations.ModelWords(model, places, system, deployment),
+                made.words,
                 engine=engine,
                 should_stop=should_stop,
                 on_progress=report,
             )
         return SynthesisOutcome(OutcomeStatus.EMPTY, None, problem.diagnostics, result.statistics, reason, explanation)
-    on_progress(Progress("verification", f"{result.statistics.states} states"))
+    on_progress(Progress("verification", f"{made.expected_states} states"))
     semantics = Semantics(system)
     certificate = certify(
         semantics,
@@ -224,6 +252,8 @@ def _supervised(
         bundle,
         deployment,
         Limits.of(verify_limit),
+        modules=[item.automata for item in made.modules] if len(made.modules) > 1 else (),
+        expected_states=made.expected_states,
         should_stop=should_stop,
         on_progress=lambda message: on_progress(Progress("verification", message)),
     )
@@ -233,20 +263,19 @@ def _supervised(
         problem.system,
         result.added,
         is_nonblocking=certificate.nonblocking == "passed",
-        states=result.statistics.states,
+        states=int(certificate.states) or made.expected_states,
         controller=controller,
         should_stop=should_stop,
     )
-    words = explanations.ModelWords(model, places, system, deployment)
-    made = Synthesized(words, result.statistics, engine, should_stop)
-    told = told_troubles(made, result.answers)
+    synthesized = Synthesized(made.words, made.effort, engine, should_stop)
+    told = told_troubles(synthesized, result.answers)
     answers = without_consequences(model, result.answers, {item.event for item in properties.forbidden})
     diagnostics = sorted_diagnostics(
         (
             *problem.diagnostics,
             *findings(model, places, answers, told),
             *controller_findings(model, system, places, properties, allow_livelock=allow_livelock),
-            *forbidden_cancel_findings(made, properties, only_shown=only_shown),
+            *forbidden_cancel_findings(synthesized, properties, only_shown=only_shown),
         )
     )
     if properties.livelock is not None and not allow_livelock:
@@ -258,7 +287,7 @@ def _supervised(
     if model.has_goals and deployment is Deployment.CONTROLLER:
         # Models without goals do not wait for what goals need.
         from robosc.certification.goals import goal_explanation
-        from robosc.certification.strategies import verify_strategy
+        from robosc.certification.strategies import GoalCheck, verify_strategy
         from robosc.strategies import (
             blame_goals,
             goal_findings,
@@ -267,9 +296,32 @@ def _supervised(
             synthesize_strategy,
         )
 
+        def check_goals(strategy: Strategy) -> GoalCheck:
+            return verify_strategy(
+                problem.system,
+                result.added,
+                strategy,
+                Limits.of(verify_limit),
+                engine=result.statistics.engine,
+                controller=controller,
+                should_stop=should_stop,
+                on_progress=lambda message: on_progress(Progress("strategy", message)),
+            )
+
         on_progress(Progress("strategy", counted(problem.system.obligations.aims)))
-        found = synthesize_strategy(
-            problem.system, result.added, engine=engine, should_stop=should_stop, on_progress=report
+        of_modules = None
+        if made.robot is not None:
+            from robosc.certification.modular_strategies import strategy_in_modules
+
+            of_modules = strategy_in_modules(
+                made.robot, problem.system, check_goals, engine=engine, should_stop=should_stop, on_progress=report
+            )
+        found = (
+            of_modules.found
+            if of_modules is not None
+            else synthesize_strategy(
+                problem.system, result.added, engine=engine, should_stop=should_stop, on_progress=report
+            )
         )
         blame = None
         if found.unreached:
@@ -288,22 +340,66 @@ def _supervised(
                 goals = goal_explanation(without, places, found, blame)
             reason = f"no strategy is made for the {goals_and_missions(model)}"
             return SynthesisOutcome(OutcomeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, reason, goals)
-        checked = verify_strategy(
-            problem.system,
-            result.added,
-            strategy,
-            Limits.of(verify_limit),
-            engine=result.statistics.engine,
-            controller=controller,
-            should_stop=should_stop,
-            on_progress=lambda message: on_progress(Progress("strategy", message)),
-        )
+        checked = check_goals(strategy) if of_modules is None else of_modules.checked
         if checked.missed is not None:
             raise InternalError(f"the strategy misses a goal after {', '.join(checked.missed.trace)}")
         late = put_off_findings(problem.system.obligations.aims, places, found, checked.put_off)
         diagnostics = sorted_diagnostics((*diagnostics, *late))
         outcome: CheckResult = "passed" if checked.outcome is CheckOutcome.PASSED else "not checked"
-        method = f"{certificate.method}; {checked.method}"
+        method = f"{certificate.method}; {checked.method if of_modules is None else of_modules.method}"
         certificate = msgspec.structs.replace(certificate, goals=outcome, method=method)
-    supervisor = Supervisor.supervising(problem.system, result.added, certificate, strategy)
+    supervisor = Supervisor.supervising(problem.system, result.added, certificate, strategy, made.modules)
     return SynthesisOutcome(OutcomeStatus.SUPERVISOR, supervisor, diagnostics, result.statistics)
+
+
+def _as_a_whole(
+    problem: SynthesisProblem,
+    deployment: Deployment,
+    engine: str | EngineOptions,
+    should_stop: Callable[[], bool],
+    on_progress: Callable[[SynthesisProgress | str], None],
+) -> _Result:
+    """The supervisor of a model, of all its automata together or of independent parts."""
+    words = explanations.ModelWords(problem.model, problem.places, problem.system.automata, deployment)
+    result = synthesize_in_parts(
+        words.system, engine=engine, questions=words.questions, should_stop=should_stop, on_progress=on_progress
+    )
+    return _Result(result, words, result.statistics.states, result.statistics.peak_nodes)
+
+
+def _in_modules(
+    problem: SynthesisProblem,
+    deployment: Deployment,
+    engine: str | EngineOptions,
+    should_stop: Callable[[], bool],
+    on_progress: Callable[[SynthesisProgress | str], None],
+) -> _Result:
+    """The same, module by module."""
+    from robosc.modular.robots import synthesize_robot
+
+    model, places, system = problem.model, problem.places, problem.system.automata
+    found = synthesize_robot(
+        model, places, system, deployment, engine=engine, should_stop=should_stop, on_progress=on_progress
+    )
+    figures = [item.result.statistics for item in found.modular.modules]
+    effort = sum(item.peak_nodes for item in figures)
+    if found.result.status is SynthesisStatus.EMPTY:
+        part = found.parts[0]
+        words = explanations.ModelWords(part.model, part.places, part.system, deployment)
+        names = ", ".join(part.components[:MAXIMUM_NAMES]) + ", ..." * (len(part.components) > MAXIMUM_NAMES)
+        result = dataclasses.replace(found.result, reason=f"{names}: {found.result.reason}")
+        return _Result(result, words, 0, effort)
+    words = explanations.ModelWords(model, places, system, deployment)
+    group_of = found.modular.group_of
+    modules = tuple(
+        SupervisedModule(
+            tuple(item.name for item in part.system.automata),
+            part.requirements,
+            part.invariants,
+            str(figures[place].states),
+            group_of[place],
+        )
+        for place, part in enumerate(found.parts)
+    )
+    most = prod(item.states for item in figures)
+    return _Result(found.result, words, found.result.statistics.states or most, effort, modules, found)

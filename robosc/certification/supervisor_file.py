@@ -8,6 +8,7 @@ different digest is reported, but does not change the verdict.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import prod
 
 from robosc._version import __version__
 from robosc.automata import ExecutableSystem, Semantics, System
@@ -15,6 +16,7 @@ from robosc.automata.compile import State
 from robosc.automata.goal_memory import Aim, AimKind
 from robosc.automata.plants import communication_plant_name
 from robosc.automata.state import subjects
+from robosc.certification.certify import with_modules
 from robosc.certification.differences import model_differences
 from robosc.certification.strategies import verify_strategy
 from robosc.controller_properties import Controller, check_controller
@@ -178,10 +180,12 @@ def verify_supervisor_file(
     system = executable.automata
     semantics = Semantics(system)
 
+    added = state_predicates(system, supervisor.added)
+
     def verified_with(expected_states: int) -> VerificationReport:
         return verify(
             system,
-            state_predicates(system, supervisor.added),
+            added,
             limits,
             expected_states=expected_states,
             engine=engine,
@@ -191,12 +195,19 @@ def verify_supervisor_file(
         )
 
     # The stated number of states decides only which search is tried first: a false figure must not prevent it.
-    stated = int(supervisor.certificate.states)
+    stated = int(supervisor.certificate.states) or prod(int(item.states) for item in supervisor.modules)
     report = verified_with(stated)
     if stated > limits.states and not report.is_complete:
         report = verified_with(0)
+    if len(supervisor.modules) > 1:
+        # The modules that the file names decide only what can be shown.
+        modules = [item.automata for item in supervisor.modules]
+        report = with_modules(report, system, added, modules, limits, should_stop=should_stop)
     found = report.verification
-    faults += [Fault("certificate", text) for text in _false_claims(supervisor.certificate, found)]
+    faults += [
+        Fault("certificate", text)
+        for text in _false_claims(supervisor.certificate, found, has_modules=bool(supervisor.modules))
+    ]
     controller = Controller(executable, supervisor.added, semantics)
     claimed = supervisor.certificate.controller
     if claimed is not None:
@@ -262,11 +273,13 @@ def _notes(certificate: Certificate, bundle: Bundle | None) -> list[str]:
     return notes
 
 
-def _false_claims(certificate: Certificate, found: Verification) -> list[str]:
+def _false_claims(certificate: Certificate, found: Verification, *, has_modules: bool) -> list[str]:
     """Return the false claims of a certificate."""
     claims = []
+    # The states of modules that share something may not have been counted.
+    states = None if has_modules and certificate.states == "0" else certificate.states
     for what, stated, counted in (
-        ("states", certificate.states, found.states),
+        ("states", states, found.states),
         ("transitions", certificate.transitions, found.transitions),
     ):
         if stated is not None and counted is not None and int(stated) != counted:

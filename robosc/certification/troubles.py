@@ -19,7 +19,7 @@ from robosc.explanation import ModelWords, Trouble
 from robosc.model.places import Places
 from robosc.model.structure import EventKind, Model
 from robosc.source import Location
-from robosc.synthesis import Answers, Cause, EngineOptions, Statistics
+from robosc.synthesis import Answers, Cause, EngineOptions
 
 CODE = "forbidden-cancel"
 """Code of the finding about a cancel that must be possible."""
@@ -36,13 +36,13 @@ class Synthesized(msgspec.Struct, frozen=True):
 
     Attributes:
         words: The automata of the model, with the words for them.
-        statistics: Figures of the synthesis.
+        nodes: Most nodes of diagrams that it needed.
         engine: Engine for decision diagrams.
         should_stop: Function called before each step; once true, the work ends.
     """
 
     words: ModelWords
-    statistics: Statistics
+    nodes: int
     engine: str | EngineOptions
     should_stop: Callable[[], bool]
 
@@ -62,7 +62,7 @@ class Synthesized(msgspec.Struct, frozen=True):
 
     @property
     def _is_small(self) -> bool:
-        return self.statistics.peak_nodes <= MAXIMUM_NODES
+        return self.nodes <= MAXIMUM_NODES
 
 
 def told_troubles(made: Synthesized, answers: Answers) -> dict[str, tuple[str, str]]:

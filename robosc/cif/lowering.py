@@ -4,29 +4,32 @@ If-updates and assignments of several variables become conditional expressions. 
 implication. Algebraic variables and constants are replaced by their expressions where they are used.
 """
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import msgspec
 
 from robosc.automata import (
-    Assignment,
     Automaton,
     DiscreteVariable,
-    Edge,
     Event,
     EventCondition,
     Role,
     System,
     SystemPlaces,
+    as_controlled,
 )
 from robosc.automata.environment import environment_variable
 from robosc.automata.structure import InputVariable
 from robosc.cif import syntax
-from robosc.cif.scopes import Entity, Scope, Scopes
-from robosc.cif.terms import Term, flat, logic, negation, truth, widened
-from robosc.cif.types import CifType, fits
-from robosc.cif.typing import NAMELESS, Typing
-from robosc.cif.updates import Updates
+from robosc.cif.circles import report_circles
+from robosc.cif.edges import Channels, Edges, data_type, event_of, place_name
+from robosc.cif.function_bodies import check_function
+from robosc.cif.scopes import Alias, Entity, Scope, allows
+from robosc.cif.terms import Term, flat, logic, negation, retyped, truth
+from robosc.cif.types import CifType, fits, is_equal
+from robosc.cif.usage import Usage
+from robosc.cif.warnings import Exclusion, Reading, warn
 from robosc.expressions import (
     FALSE,
     TRUE,
@@ -34,13 +37,12 @@ from robosc.expressions import (
     EnumType,
     Expression,
     IntegerType,
-    StateTest,
     Type,
+    Unary,
     VariableRead,
     conjunction,
     default_value,
     domain,
-    leaves,
 )
 from robosc.source import Location
 
@@ -48,21 +50,11 @@ MAXIMUM_VALUES = 2**20
 """Values of a variable's type beyond which it is refused."""
 
 
-class Exclusion(msgspec.Struct, frozen=True):
-    """An event that is allowed only where a condition is true."""
-
-    event: Entity
-    condition: Expression
-    role: str
-    at: Location
-
-
-class Lowering(msgspec.Struct):
+class Lowering(Usage):
     """Parts of a system, gathered component by component.
 
     Attributes:
-        scopes: Components of the specification.
-        typing: Meaning of their expressions.
+        channels: Senders and receivers of channels.
         events: Events with their names.
         automata: Automata.
         places: Places of the automata, by their names.
@@ -70,16 +62,15 @@ class Lowering(msgspec.Struct):
         exclusions: Event exclusions of plants and requirements.
         invariants: State invariants of requirements, with their places.
         plant_invariants: State invariants of plants.
+        plant_places: Their places.
         initial: Predicates on the initial states.
         marker: Predicates on the marked states.
         roles: Roles of automata and invariants, with their places.
+        never: Channels that have nobody at one of their ends.
         event_places: Place of the declaration of each event.
-        plant_reads: Expressions of plants, with the places where they do.
-        depends: Variables that the initial value of a variable reads, with the places where it does.
     """
 
-    scopes: Scopes
-    typing: Typing
+    channels: Channels = msgspec.field(default_factory=Channels)
     events: list[Event] = msgspec.field(default_factory=list)
     automata: list[Automaton] = msgspec.field(default_factory=list)
     places: dict[str, Location] = msgspec.field(default_factory=dict)
@@ -87,99 +78,51 @@ class Lowering(msgspec.Struct):
     exclusions: list[Exclusion] = msgspec.field(default_factory=list)
     invariants: list[tuple[Expression, Location]] = msgspec.field(default_factory=list)
     plant_invariants: list[Expression] = msgspec.field(default_factory=list)
+    plant_places: list[Location] = msgspec.field(default_factory=list)
     initial: list[Expression] = msgspec.field(default_factory=list)
     marker: list[Expression] = msgspec.field(default_factory=list)
+    never: list[Entity] = msgspec.field(default_factory=list)
     event_places: dict[str, Location] = msgspec.field(default_factory=dict)
-    plant_reads: list[tuple[Expression, Location]] = msgspec.field(default_factory=list)
     roles: list[tuple[str, Location]] = msgspec.field(default_factory=list)
-    depends: dict[tuple[str, str], dict[tuple[str, str], Location]] = msgspec.field(default_factory=dict)
-
-    # Findings
-
-    def error(self, code: str, message: str, location: Location, fix: str) -> None:
-        """Report an error."""
-        self.typing.error(code, message, location, fix)
-
-    def unsupported(self, scope: Scope, message: str, location: Location, fix: str) -> None:
-        """Report what synthesis does not take, unless it stands in a definition without an instance."""
-        if scope.is_real:
-            self.error("cif-unsupported", message, location, fix)
-
-    def used(self, term: Term, scope: Scope, at: Location) -> Expression:
-        """The expression of a term that is used; `true` after an error."""
-        if not scope.is_real or not self.typing.usable(term, at):
-            return TRUE
-        return term.core
-
-    def used_by(self, role: str | None, term: Term, scope: Scope, at: Location) -> Expression:
-        """The expression of a term that a plant or a requirement uses."""
-        found = self.used(term, scope, at)
-        if role == "plant":
-            self.plant_reads.append((found, at))
-        return found
 
     # The whole
 
     def lowered(self, name: str) -> tuple[System, SystemPlaces]:
         """The system, with the places of its parts; of use only if no error is found."""
+        self.channels.gather(self)
         for scope in self.scopes.scopes():
-            self.scopes.check_arguments(scope)
             for entry in list(scope.entries.values()):
                 if isinstance(entry, Entity):
                     self.typing.check(entry)
+                elif isinstance(entry, Alias):
+                    self._argument(entry)
             for item in scope.body:
                 self._declaration(item, scope)
             if scope.is_automaton:
                 self._automaton(scope)
-        self._check_initial_values()
+        report_circles(self.typing)
+        self.never += self.channels.settle(self, self.automata)
+        system, places = self._system(name)
         if not self.typing.findings.has_errors:
-            self._warn()
-        return self._system(name)
-
-    def _warn(self) -> None:
-        """Report what is mostly meant otherwise: plants that read requirements, and events that never happen."""
-        warn = self.typing.findings.warning
-        requirements = {item.name for item in self.automata if item.role is Role.REQUIREMENT}
-        for expression, at in self.plant_reads:
-            read = {leaf.component for leaf in leaves(expression) if isinstance(leaf, VariableRead | StateTest)}
-            if names := sorted(read & requirements):
-                message = f"a plant reads the state of the requirement '{names[0]}'"
-                warn("cif-plant-reads-requirement", message, at, "Make it a plant, or let a requirement say this.")
-        # An invariant about an event that is in no alphabet has a finding of its own.
-        excluded = {item.event.name for item in self.exclusions}
-        unused: dict[Location, list[str]] = {}
-        for event, at in self.event_places.items():
-            having = [item for item in self.automata if event in item.alphabet]
-            if not having and event not in excluded:
-                unused.setdefault(at, []).append(event)
-            for item in having:
-                guards = [edge.guard for edge in item.edges if edge.event == event]
-                if event not in item.monitors and all(guard == FALSE for guard in guards):
-                    why = "has only edges of it whose guards are false" if guards else "has no edge of it"
-                    message = f"'{event}' never happens: '{item.name}' {why}"
-                    fix = "Add an edge, or take the event out of the alphabet."
-                    warn("cif-event-never-happens", message, self.places[item.name], fix)
-        for at, events in unused.items():
-            more = f" and {len(events) - 1} more" if len(events) > 1 else ""
-            message = f"no automaton has '{events[0]}'{more} in its alphabet"
-            warn("cif-unused-event", message, at, "Remove it, or use it on an edge.")
+            warn(Reading(system, places, self.exclusions, self.plant_reads, self.plant_places, self.event_places,
+                         self.scopes, self.never), self.typing.findings)  # fmt: skip
+        return system, places
 
     def _system(self, name: str) -> tuple[System, SystemPlaces]:
         alphabet = frozenset[str]().union(*(item.alphabet for item in self.automata))
         is_controlled = self._is_controlled()
         conditions: dict[bool, list[tuple[EventCondition, Location]]] = {True: [], False: []}
+        conditions[True] += [(EventCondition(item.name, FALSE), item.at) for item in self.never]
         for item in self.exclusions:
             event = item.event.name
-            declaration = item.event.declaration
-            if isinstance(declaration, syntax.Event) and declaration.data is not None:
-                # It is refused where it is declared.
-                continue
             if event not in alphabet:
                 message = f"no automaton has '{event}' in its alphabet, so this excludes nothing"
                 self.typing.findings.warning("cif-no-effect", message, item.at, "Remove it, or use the event.")
             elif item.condition != TRUE:
                 conditions[item.role == "plant"].append((EventCondition(event, item.condition), item.at))
-        if not any(item.role is Role.PLANT for item in self.automata) and not self.typing.findings.has_errors:
+        # A supervisor alone says what happens, too.
+        has_plant = is_controlled or any(item.role is Role.PLANT for item in self.automata)
+        if not (self.automata and has_plant) and not self.typing.findings.has_errors:
             self.error("cif-unsupported", "there is no plant automaton", self.scopes.root.at, "Add one.")
         system = System(
             name=name,
@@ -188,20 +131,20 @@ class Lowering(msgspec.Struct):
             inputs=tuple(self.inputs),
             conditions=tuple(item for item, _ in conditions[False]),
             invariants=tuple(item for item, _ in self.invariants),
-            # No state is one that a supervisor excludes; against a requirement the system may begin.
-            initial=conjunction(*self.initial, *(item for item, _ in self.invariants if is_controlled)),
+            initial=conjunction(*self.initial),
             marker=conjunction(*self.marker),
             plant_conditions=tuple(item for item, _ in conditions[True]),
             plant_invariants=tuple(self.plant_invariants),
-            is_controlled=is_controlled,
         )
         places = SystemPlaces(
             automata=self.places,
             conditions=tuple(at for _, at in conditions[False]),
             invariants=tuple(at for _, at in self.invariants),
             plant_conditions=tuple(at for _, at in conditions[True]),
+            events=self.event_places,
         )
-        return system, places
+        # A supervisor excludes initial states, too; against a requirement the system may begin.
+        return as_controlled(system) if is_controlled else system, places
 
     def _is_controlled(self) -> bool:
         """Return True if there is a supervisor; then there must be no requirement."""
@@ -214,13 +157,41 @@ class Lowering(msgspec.Struct):
 
     # Declarations
 
+    def _argument(self, alias: Alias) -> None:
+        """Check what is given for a parameter, used or not: an event must be as the parameter says."""
+        found, parameter, argument = self.scopes.target(alias), alias.parameter, alias.argument
+        is_event = isinstance(found, Entity) and isinstance(found.declaration, syntax.Event)
+        if not is_event or not isinstance(found, Entity) or not isinstance(argument, syntax.Name):
+            return
+        assert isinstance(found.declaration, syntax.Event)  # noqa: S101 - asked above
+        # An argument that is a parameter itself is known by its declaration alone.
+        given, _ = self.scopes.parameter(argument, alias.argument_scope)
+        is_controllable = found.declaration.is_controllable if given is None else given.is_controllable
+        if parameter.is_controllable not in (None, is_controllable):
+            word = "controllable" if parameter.is_controllable else "uncontrollable"
+            self.error("cif-arguments", f"'{argument}' is not {word}, as '{parameter.name.text}' must be", argument.at,
+                       f"Give a {word} event, or leave the word out of the parameter.")  # fmt: skip
+        for use in "!?~" if given is not None else "":
+            if given is not None and allows(parameter, use) and not allows(given, use):
+                self.error("cif-arguments", f"'{argument}' does not allow the use '{use}', as '{parameter.name.text}' "
+                           "does", argument.at, "Give both the same flags.")  # fmt: skip
+        wanted = None if parameter.type is None else self.typing.type(parameter.type, alias.scope.parent or alias.scope)
+        type_ = data_type(self.typing, argument, found, alias.argument_scope)
+        if wanted is not None and (type_ is None or not is_equal(type_, wanted)):
+            has = f"data of type {type_}" if type_ else "no data"
+            message = f"'{argument}' has {has}, and '{parameter.name.text}' takes {wanted}"
+            self.error("cif-arguments", message, argument.at, "Give an event with data of that type.")
+
     def _declaration(self, item: syntax.Declaration, scope: Scope) -> None:
         match item:
             case syntax.Event(name=name):
                 self._event(item, scope.absolute(name.text), scope)
             case syntax.Input(name=name):
                 self._input(item, scope.absolute(name.text), scope)
-            case syntax.Continuous(name=name):
+            case syntax.Continuous(name=name, value=value, derivative=derivative):
+                for part in (value, derivative):
+                    if part is not None:
+                        self.typing.real(part, scope)
                 self.unsupported(scope, f"'{scope.absolute(name.text)}' is a continuous variable", name.at,
                                  "Use a discrete variable.")  # fmt: skip
             case syntax.Predicates(word=word, predicates=predicates, at=at):
@@ -231,12 +202,12 @@ class Lowering(msgspec.Struct):
                 self._invariant(item, scope, None)
             case syntax.Equation():
                 self._equation(item, scope)
+            case syntax.Function():
+                check_function(self.typing, item, scope)
             case syntax.InputOutput(word="svgin", at=at):
                 self.typing.findings.warning("cif-no-effect", "input from pictures is left aside", at, "Remove it.")
 
     def _event(self, item: syntax.Event, name: str, scope: Scope) -> None:
-        if item.data is not None:
-            self.unsupported(scope, f"'{name}' is a channel", item.name.at, "Use events without data.")
         if item.is_controllable is None:
             self.unsupported(scope, f"'{name}' is neither controllable nor uncontrollable", item.name.at,
                              "Write 'controllable' or 'uncontrollable' before it.")  # fmt: skip
@@ -274,20 +245,21 @@ class Lowering(msgspec.Struct):
         return True
 
     def _equation(self, item: syntax.Equation, scope: Scope) -> None:
-        entry = scope.entries.get(item.name.text)
-        is_there = isinstance(entry, Entity) and isinstance(entry.declaration, syntax.Algebraic | syntax.Continuous)
-        if not is_there or item.name.text in scope.parameters:
-            message = f"'{item.name.text}' is not an algebraic variable of this component"
-            self.error("cif-structure", message, item.name.at,
-                       "Declare it here, with 'alg'.")  # fmt: skip
-        self.typing.term(item.value, scope)
+        entry = None if item.name.text in scope.parameters else scope.entries.get(item.name.text)
+        wanted = syntax.Continuous if item.is_derivative else syntax.Algebraic
+        if not isinstance(entry, Entity) or not isinstance(entry.declaration, wanted):
+            what = "a continuous" if item.is_derivative else "an algebraic"
+            message = f"'{item.name.text}' is not {what} variable of this component"
+            self.error("cif-structure", message, item.name.at, "Declare it here, with 'alg'.")
+        if item.is_derivative:
+            self.typing.real(item.value, scope)
 
     # Invariants
 
     def _invariant(self, item: syntax.Invariant, scope: Scope, place: Term | None) -> None:
         """Take an invariant; `place` is the location that it stands in."""
         predicate = self.typing.predicate(item.predicate, scope)
-        events = [self._event_of(name, scope) for name in item.events]
+        events = [event_of(self.scopes, name, scope) for name in item.events]
         if item.role is None:
             self.unsupported(scope, "this invariant has no role", item.at,
                              "Write 'plant', 'requirement' or 'supervisor' before it.")  # fmt: skip
@@ -301,24 +273,19 @@ class Lowering(msgspec.Struct):
         condition = self.used_by(item.role, predicate, scope, item.predicate.at)
         if not scope.is_real:
             return
+        if item.form is syntax.InvariantForm.DISABLES and isinstance(condition, Unary) and place is None:
+            # The form of `disables`, so that texts have it as it was written.
+            condition = Unary("not", Unary("holds", condition.operand))
         if item.form is syntax.InvariantForm.STATE:
             if item.role == "plant":
                 self.plant_invariants.append(condition)
+                self.plant_places.append(item.at)
             else:
                 self.invariants.append((condition, item.at))
             return
         for event in events:
             if event is not None:
                 self.exclusions.append(Exclusion(event, condition, item.role, item.at))
-
-    def _event_of(self, name: syntax.Name, scope: Scope) -> Entity | None:
-        found = self.scopes.resolve(name, scope)
-        if found is None:
-            return None
-        if isinstance(found, Entity) and isinstance(found.declaration, syntax.Event):
-            return found
-        self.scopes.wrong_kind(name, found, "an event")
-        return None
 
     # Automata
 
@@ -336,22 +303,27 @@ class Lowering(msgspec.Struct):
             self.roles.append((scope.role, scope.at))
         discrete = [item for item in scope.body if isinstance(item, syntax.Discrete)]
         variables = [variable for item in discrete for variable in self._variables(item, scope)]
-        edges = [edge for place in places for item in place.edges for edge in self._edges(item, place, scope)]
-        initial = [_name(place) for place in places if self._holds(place, "initial", scope, self.initial)]
-        marked = [_name(place) for place in places if self._holds(place, "marked", scope, self.marker)]
+        reader = Edges(self, scope, self.channels)
+        edges = [edge for place in places for item in place.edges for edge in reader.read(item, place)]
+        initial = [place_name(place) for place in places if self._holds(place, "initial", scope, self.initial)]
+        marked = [place_name(place) for place in places if self._holds(place, "marked", scope, self.marker)]
         for place in places:
             for invariant in place.invariants:
                 self._invariant(invariant, scope, self.typing.location(scope, place))
             for equation in place.equations:
                 self._equation(equation, scope)
-        alphabet, monitors = self._alphabets(scope, edges)
+        alphabet, monitors = self._alphabets(scope, frozenset(reader.events))
+        for name in sorted(alphabet & reader.channels):
+            self.error("cif-structure", f"'{scope.path}' is an end of the channel '{name}', and has it in its alphabet",
+                       scope.at, "Let another automaton do either.")  # fmt: skip
+        alphabet |= reader.channels
         if not scope.is_real:
             return
         self.places[scope.path] = scope.at
         self.automata.append(
             Automaton(
                 name=scope.path,
-                locations=tuple(_name(place) for place in places),
+                locations=tuple(place_name(place) for place in places),
                 initial=tuple(initial),
                 marked=frozenset(marked),
                 alphabet=alphabet,
@@ -362,17 +334,21 @@ class Lowering(msgspec.Struct):
             )
         )
 
-    def _alphabets(self, scope: Scope, edges: list[Edge]) -> tuple[frozenset[str], frozenset[str]]:
+    def _alphabets(self, scope: Scope, used: frozenset[str]) -> tuple[frozenset[str], frozenset[str]]:
         """The alphabet of an automaton, and the events that it monitors."""
         found: dict[str, frozenset[str] | None] = {"alphabet": None, "monitor": None}
-        used = frozenset(edge.event for edge in edges)
         lists = [item for item in scope.body if isinstance(item, syntax.Alphabet)]
         # A monitored event is in the alphabet, wherever that stands.
         for item in sorted(lists, key=lambda item: item.word):
             if found[item.word] is not None:
                 self.error("cif-structure", f"there are two of '{item.word}' in '{scope.path}'", item.at,
                            "Join them.")  # fmt: skip
-            entities = [(name, self._event_of(name, scope)) for name in item.events]
+            entities = [(name, event_of(self.scopes, name, scope)) for name in item.events]
+            for name in item.events if item.word == "alphabet" else ():
+                parameter, _ = self.scopes.parameter(name, scope)
+                if parameter is not None and not allows(parameter, "~"):
+                    self.error("cif-arguments", f"the flags of the parameter '{name}' do not allow this use", name.at,
+                               "Add the flag '~' to it.")  # fmt: skip
             names = frozenset(entity.name for _, entity in entities if entity is not None)
             whole = used if found["alphabet"] is None else found["alphabet"]
             if item.word == "monitor":
@@ -394,7 +370,13 @@ class Lowering(msgspec.Struct):
         found = [item for item in place.predicates if item.word == word]
         if not found:
             return False
-        terms = [self.typing.conjunction(item.predicates, scope) for item in found]
+        entry = scope.entries.get(place.name.text) if place.name is not None and word == "initial" else None
+        node = entry if isinstance(entry, Entity) else scope
+        with self.typing.depending(node) if word == "initial" else nullcontext():
+            terms = [self.typing.conjunction(item.predicates, scope) for item in found]
+        if node is not scope:
+            # The beginning of an automaton depends on which locations are initial.
+            self.typing.depends.setdefault(scope, {})[node] = found[0].at
         term = terms[0]
         for other in terms[1:]:
             term = logic("and", term, other)
@@ -410,20 +392,25 @@ class Lowering(msgspec.Struct):
         """The variables of a declaration: one, or one for each field of a tuple."""
         wanted = self.typing.type(item.type, scope)
         is_variable = self._is_variable(item.name, wanted, scope)
-        terms = [(self.typing.term(value, scope), value.at) for value in item.values]
+        entry = scope.entries.get(item.name.text)
+        # Another thing of this name has been reported.
+        is_own = isinstance(entry, Entity) and entry.declaration is item
+        self.typing.has_distributions = True
+        with self.typing.depending(entry if isinstance(entry, Entity) else scope):
+            terms = [(self.typing.term(value, scope, wanted), value.at) for value in item.values]
+        self.typing.has_distributions = False
         if "unknown" in (wanted.kind, *(term.type.kind for term, _ in terms)):
             return []
         for term, at in terms:
             if not fits(term.type, wanted):
                 self.typing.mismatch(f"{term.type} does not fit {wanted}", at)
                 return []
-        entry = scope.entries.get(item.name.text)
-        if not is_variable or not scope.is_real or not isinstance(entry, Entity):
+        if not is_variable or not scope.is_real or not isinstance(entry, Entity) or not is_own:
             return []
         own = self.typing.entity(entry)
         if own.type.kind == "unknown":
             return []
-        terms = [(widened(term, wanted), at) for term, at in terms]
+        terms = [(retyped(term, wanted), at) for term, at in terms]
         found = [(old.expression, old.type) for old in flat(own)]
         parts = [(read.variable, type_) for read, type_ in found if isinstance(read, VariableRead)]
         is_static = all(term.is_static for term, _ in terms)
@@ -450,82 +437,6 @@ class Lowering(msgspec.Struct):
         for term, at in terms:
             whole = logic("or", whole, self.typing.equality(own, term, at))
         self.initial.append(self.used_by(scope.role, whole, scope, item.name.at))
-        names = [old.expression.variable for old in flat(own) if isinstance(old.expression, VariableRead)]
-        for term, at in terms:
-            for part in flat(term):
-                for leaf in leaves(part.core):
-                    if isinstance(leaf, VariableRead):
-                        for name in names:
-                            self.depends.setdefault((scope.path, name), {})[leaf.component, leaf.variable] = at
-
-    def _check_initial_values(self) -> None:
-        """Report initial values that go round in a circle."""
-        finished = set[tuple[str, str]]()
-        for start in self.depends:
-            path: list[tuple[str, str]] = [start]
-            iterators = [iter(self.depends[start].items())]
-            while path:
-                following = next(iterators[-1], None)
-                if following is None:
-                    finished.add(path.pop())
-                    iterators.pop()
-                elif following[0] in path:
-                    self.error("cif-cycle", f"the initial value of '{'.'.join(following[0])}' is defined by itself",
-                               following[1], "Break the circle.")  # fmt: skip
-                elif following[0] not in finished and following[0] in self.depends:
-                    path.append(following[0])
-                    iterators.append(iter(self.depends[following[0]].items()))
-
-    # Edges
-
-    def _edges(self, item: syntax.Edge, place: syntax.LocationDeclaration, scope: Scope) -> list[Edge]:
-        at = item.guards[0].at if item.guards else item.at
-        guard = self.used_by(scope.role, self.typing.conjunction(item.guards, scope), scope, at)
-        self.typing.is_receiving = bool(item.events) and all(event.use == "?" for event in item.events)
-        assigned = Updates(self.typing).assigned(item.updates, scope)
-        self.typing.is_receiving = False
-        updates = tuple(
-            Assignment(name, self.used_by(scope.role, new.term, scope, new.at)) for name, new in assigned.items()
-        )
-        target = self._target(item, place, scope)
-        if not item.events:
-            self.unsupported(scope, "this edge has no event, which means 'tau'", item.at, "Give it an event.")
-        found = []
-        for event in item.events:
-            if event.name is None:
-                self.unsupported(scope, "this edge has the event 'tau'", event.at, "Give it an event of its own.")
-                continue
-            entity = self._event_of(event.name, scope)
-            self._check_use(event, entity, scope)
-            if entity is not None and not event.use:
-                found.append(Edge(_name(place), entity.name, target, guard, updates))
-        return found
-
-    def _check_use(self, event: syntax.EdgeEvent, entity: Entity | None, scope: Scope) -> None:
-        """Check what an edge sends or receives; that synthesis takes no channels is reported where one is declared."""
-        sent = self.typing.term(event.value, scope) if event.value is not None else None
-        if entity is None or not event.use:
-            return
-        assert isinstance(entity.declaration, syntax.Event)  # noqa: S101 - the entity of an event
-        data = entity.declaration.data
-        if data is None:
-            self.typing.mismatch(f"'{event.name}' is no channel", event.at, "Write the event without '!' or '?'.")
-            return
-        type_ = None if data.kind == "void" else self.typing.type(data, entity.scope)
-        if event.use == "!" and (sent is None) != (type_ is None):
-            count = "no value" if sent is None else "a value"
-            self.typing.mismatch(f"'{event.name}' is a channel of {type_ or 'void'}, and is sent {count}", event.at)
-        elif sent is not None and type_ is not None and event.value is not None and not fits(sent.type, type_):
-            self.typing.mismatch(f"{sent.type} does not fit {type_}", event.value.at)
-
-    def _target(self, item: syntax.Edge, place: syntax.LocationDeclaration, scope: Scope) -> str:
-        if item.target is None:
-            return _name(place)
-        entry = None if item.target.text in scope.parameters else scope.entries.get(item.target.text)
-        if not isinstance(entry, Entity) or not isinstance(entry.declaration, syntax.LocationDeclaration):
-            message = f"'{item.target.text}' is not a location of this automaton"
-            self.error("cif-unknown-name", message, item.target.at, "Write the name of one of its locations.")
-        return item.target.text
 
 
 def core_type(type_: CifType) -> Type:
@@ -537,7 +448,3 @@ def core_type(type_: CifType) -> Type:
             return EnumType(type_.name, type_.names)
         case _:
             return IntegerType(*type_.range)
-
-
-def _name(place: syntax.LocationDeclaration) -> str:
-    return NAMELESS if place.name is None else place.name.text

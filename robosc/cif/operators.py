@@ -18,15 +18,14 @@ from robosc.cif.terms import (
     logic,
     made,
     negation,
-    number,
     quotient,
     remainder,
     result_range,
+    retyped,
     static,
     truth,
     tuple_parts,
     tuple_term,
-    widened,
 )
 from robosc.cif.types import (
     BOOL,
@@ -34,10 +33,10 @@ from robosc.cif.types import (
     STRING,
     UNKNOWN,
     CifType,
-    declared,
     integer,
     is_compatible,
-    joined,
+    is_equal,
+    merged,
 )
 from robosc.expressions import MAXIMUM_INTEGER, MINIMUM_INTEGER, Binary, Unary
 from robosc.model.findings import Findings
@@ -48,6 +47,9 @@ MAXIMUM_ELEMENTS = 100_000
 
 MAXIMUM_PARTS = 1000
 """Types that a type may be made of."""
+
+_DECIDED = {("and", False), ("or", True), ("=>", False)}
+"""Operators that the value of their first operand decides."""
 
 _ARITHMETIC: Mapping[str, Callable[[int, int], int]] = {
     "+": add, "-": sub, "*": mul, "div": quotient, "mod": remainder,
@@ -61,7 +63,7 @@ class Operators:
         findings: Findings so far.
 
     Attributes:
-        is_evaluating: True in the value of a constant, where whatever is known beforehand may be compared.
+        is_evaluating: True in what is evaluated beforehand, where whatever is known may be compared, and all must be.
     """
 
     def __init__(self, findings: Findings) -> None:
@@ -76,6 +78,10 @@ class Operators:
         """Report that types do not fit; the term of an error."""
         self.error("cif-type", message, at, fix or "Use an expression of a type that fits.")
         return ERROR
+
+    def failed(self, type_: CifType, message: str, at: Location) -> Term:
+        """The term of a value that is known beforehand not to be there, which matters where it is needed."""
+        return broken(type_, problem=Problem(message, at))
 
     def sized(self, type_: CifType, at: Location) -> CifType:
         """Return a type unless it is too large to work with, which is reported."""
@@ -93,8 +99,10 @@ class Operators:
                 return self.mismatch(f"'not' needs a boolean; this is {of_type(term.type)}", node.at)
             return negation(term)
         if node.operator == "sample":
-            return broken(term.type.parts[0] if term.type.parts else UNKNOWN, term,
-                          problem=Problem("a distribution is sampled", node.at))  # fmt: skip
+            if term.type.kind != "dist":
+                return self.mismatch(f"'sample' needs a distribution; this is {of_type(term.type)}", node.at)
+            type_ = CifType("tuple", parts=(term.type.parts[0], term.type))
+            return broken(type_, term, problem=Problem("a distribution is sampled", node.at))
         if not term.type.is_number:
             return self.mismatch(f"'{node.operator}' needs a number; this is {of_type(term.type)}", node.at)
         if node.operator == "+":
@@ -110,7 +118,8 @@ class Operators:
             low += 1
         type_ = integer(-high, -low)
         if term.is_static:
-            return self._integer(type_ if term.type.low is not None else CifType("int"), -term.value, node.at)
+            return self.integer(type_ if term.type.low is not None else CifType("int"), -term.value, node.at)
+        type_ = type_ if term.type.low is not None else CifType("int")
         return made(type_, Unary("-", term.core), term) if term.is_usable else broken(type_, term)
 
     def binary(self, node: syntax.Binary, left: Term, right: Term) -> Term:
@@ -120,6 +129,9 @@ class Operators:
             return ERROR
         if operator in ("and", "or", "=>", "<=>"):
             if left.type.kind == right.type.kind == "bool":
+                # The rest is not evaluated then, and may have no value.
+                if self.is_evaluating and left.is_static and (operator, left.value) in _DECIDED:
+                    return truth(operator != "and")
                 return logic(operator, left, right)
             if operator in ("and", "or") and left.type.kind == right.type.kind == "set":
                 return self._sets(node, left, right)
@@ -141,11 +153,9 @@ class Operators:
 
     def equality(self, operator: str, at: Location, left: Term, right: Term) -> Term:
         """The term of `=` or `!=` between two operands."""
-        common = joined(left.type, right.type)
-        if common is None or common.kind in ("automaton", "func", "dist"):
+        if not (is_compatible(left.type, right.type) and left.type.has_equality and right.type.has_equality):
             return self._unfit(operator, at, left, right)
-        left, right = widened(left, common), widened(right, common)
-        if left.is_static and right.is_static and (self.is_evaluating or common.kind in ("bool", "int", "enum")):
+        if left.is_static and right.is_static and (self.is_evaluating or left.type.kind in ("bool", "int", "enum")):
             return truth((left.value == right.value) is (operator == "="))
         if left.type.kind == "bool":
             return logic(operator, left, right)
@@ -183,7 +193,7 @@ class Operators:
             return self._real(node, left, right)
         if "real" in (left.type.kind, right.type.kind):
             return self._unfit(node.operator, node.at, left, right)
-        if operator in ("div", "mod") and right.is_static and right.value == 0:
+        if operator in ("div", "mod") and (right.type.low, right.type.high) == (0, 0):
             return self.mismatch("this divides by zero", node.at)
         low, high = result_range(operator, left.type.range, right.type.range)
         is_ranged = left.type.low is not None and right.type.low is not None
@@ -193,7 +203,9 @@ class Operators:
             low, high = max(low, MINIMUM_INTEGER), min(high, MAXIMUM_INTEGER)
         type_ = integer(low, high) if is_ranged else CifType("int")
         if left.is_static and right.is_static:
-            return self._integer(type_, _ARITHMETIC[operator](left.value, right.value), node.at)
+            if operator in ("div", "mod") and right.value == 0:
+                return self.failed(type_, "this divides by zero", node.at)
+            return self.integer(type_, _ARITHMETIC[operator](left.value, right.value), node.at)
         if not (left.is_usable and right.is_usable):
             return broken(type_, left, right)
         if operator in ("div", "mod") and not (right.is_static and right.value > 0):
@@ -205,45 +217,46 @@ class Operators:
         if not (left.is_static and right.is_static):
             return broken(REAL, left, right, problem=Problem("this computes with real numbers", node.at))
         a, b = float(left.value), float(right.value)
-        try:
-            value = {"+": lambda: a + b, "-": lambda: a - b, "*": lambda: a * b, "/": lambda: a / b}[node.operator]()
-        except ZeroDivisionError:
-            return self.mismatch("this divides by zero", node.at)
+        if node.operator == "/" and b == 0:
+            return self.failed(REAL, "this divides by zero", node.at)
+        value = {"+": lambda: a + b, "-": lambda: a - b, "*": lambda: a * b, "/": lambda: a / b}[node.operator]()
         return self.real(value, node.at)
 
-    def _integer(self, type_: CifType, value: int, at: Location) -> Term:
+    def integer(self, type_: CifType, value: int, at: Location) -> Term:
+        """The term of a result that is an integer, if it is one of 32 bits."""
         if not MINIMUM_INTEGER <= value <= MAXIMUM_INTEGER:
-            return self.mismatch("the result leaves 32 bits", at)
+            return self.failed(type_, "the result leaves 32 bits", at)
         return static(type_, value)
 
     def real(self, value: float, at: Location) -> Term:
         """The term of a result that is a real number, if it is one."""
         if not math.isfinite(value):
-            return self.mismatch("the result is larger than real numbers can be", at)
+            return self.failed(REAL, "the result is larger than real numbers can be", at)
         # A sum with zero makes the negative zero the one that there is.
         return static(REAL, value + 0.0)
 
     def _sets(self, node: syntax.Binary, left: Term, right: Term) -> Term:
-        type_ = joined(left.type, right.type)
-        if type_ is None:
+        if not is_compatible(left.type, right.type):
             return self._unfit(node.operator, node.at, left, right)
+        type_ = merged(left.type, right.type)
         if not (left.is_static and right.is_static):
             return broken(type_, left, right, problem=Problem("this computes with sets", node.at))
-        one, other = widened(left, type_).value, widened(right, type_).value
-        return static(type_, one & other if node.operator == "and" else one | other)
+        return static(type_, left.value & right.value if node.operator == "and" else left.value | right.value)
 
     def _collections(self, node: syntax.Binary, left: Term, right: Term) -> Term:
         """Join or subtract strings, lists, sets or dictionaries."""
-        type_ = joined(left.type, right.type)
-        if node.operator == "-" and left.type.kind == "dict":
+        kind = left.type.kind
+        if node.operator == "-" and kind == "dict":
             return self._without_keys(node, left, right)
-        kind = "" if type_ is None else type_.kind
         is_known = kind in ("string", "list", "dict") if node.operator == "+" else kind == "set"
-        if type_ is None or not is_known:
+        if not is_known or not is_compatible(left.type, right.type):
             return self._unfit(node.operator, node.at, left, right)
+        type_ = merged(left.type, right.type)
+        if kind == "list" and type_.low is not None:
+            lengths = [one + other for one, other in zip(left.type.range, right.type.range, strict=True)]
+            type_ = CifType("list", lengths[0], min(lengths[1], MAXIMUM_INTEGER), type_.parts)
         if not (left.is_static and right.is_static):
             return broken(type_, left, right, problem=Problem(f"this computes with values of type {type_}", node.at))
-        left, right = widened(left, type_), widened(right, type_)
         if node.operator == "-":
             return static(type_, left.value - right.value)
         if len(left.value) + len(right.value) > MAXIMUM_ELEMENTS:
@@ -252,26 +265,28 @@ class Operators:
             return ERROR
         if kind == "dict":
             return static(type_, frozenset((dict(left.value) | dict(right.value)).items()))
-        value = left.value + right.value
-        if kind == "list":
-            type_ = CifType("list", len(value), len(value), type_.parts, is_open=type_.is_open)
-        return static(type_, value)
+        return static(type_, left.value + right.value)
 
     def _without_keys(self, node: syntax.Binary, left: Term, right: Term) -> Term:
         """Remove the keys of a dictionary, or of a list or set of keys, from a dictionary."""
-        is_fit = right.type.kind in ("dict", "list", "set") and joined(left.type.parts[0], right.type.parts[0])
+        is_fit = is_compatible(left.type, right.type) if right.type.kind == "dict" else (
+            right.type.kind in ("list", "set") and is_compatible(left.type.parts[0], right.type.parts[0])
+        )  # fmt: skip
         if not is_fit:
             return self._unfit(node.operator, node.at, left, right)
+        type_ = merged(left.type, right.type) if right.type.kind == "dict" else left.type
         if not (left.is_static and right.is_static):
-            return broken(left.type, left, right, problem=Problem("this computes with dictionaries", node.at))
+            return broken(type_, left, right, problem=Problem("this computes with dictionaries", node.at))
         keys = set(dict(right.value) if right.type.kind == "dict" else right.value)
-        return static(left.type, frozenset(item for item in left.value if item[0] not in keys))
+        return static(type_, frozenset(item for item in left.value if item[0] not in keys))
 
     def _membership(self, node: syntax.Binary, left: Term, right: Term) -> Term:
         if node.operator == "sub":
-            if left.type.kind != "set" or joined(left.type, right.type) is None:
-                return self._unfit(node.operator, node.at, left, right)
-        elif right.type.kind not in ("list", "set", "dict") or joined(left.type, right.type.parts[0]) is None:
+            is_fit = left.type.kind == right.type.kind == "set" and is_compatible(left.type, right.type)
+        else:
+            is_fit = right.type.kind in ("list", "set", "dict") and left.type.has_equality
+            is_fit = is_fit and is_compatible(left.type, right.type.parts[0])
+        if not is_fit:
             return self._unfit(node.operator, node.at, left, right)
         if not (left.is_static and right.is_static):
             return broken(BOOL, left, right, problem=Problem(f"'{node.operator}' has a value of a state", node.at))
@@ -279,41 +294,57 @@ class Operators:
             return truth(left.value <= right.value)
         return truth(left.value in (dict(right.value) if right.type.kind == "dict" else right.value))
 
-    def choice(self, condition: Term, then: Term, otherwise: Term, at: Location) -> Term:
-        """`if condition: then else otherwise end`."""
+    def choice(self, condition: Term, then: Term, otherwise: Term, type_: CifType) -> Term:
+        """`if condition: then else otherwise end`, of one type."""
         if "unknown" in (condition.type.kind, then.type.kind, otherwise.type.kind):
             return ERROR
-        type_ = joined(then.type, otherwise.type)
-        if type_ is None or type_.kind == "automaton":
-            return self.mismatch(f"the branches have types that do not fit: {then.type} and {otherwise.type}", at)
-        return conditional(condition, widened(then, type_), widened(otherwise, type_), type_)
+        return conditional(condition, retyped(then, type_), retyped(otherwise, type_), type_)
 
-    def group(self, node: syntax.Group, items: list[Term]) -> Term:
+    def common(self, terms: list[Term], at: Location, what: str) -> CifType | None:
+        """The type of values that must all fit the first; None after reporting that they do not."""
+        found = terms[0].type
+        for term in terms[1:]:
+            if not is_compatible(terms[0].type, term.type):
+                self.mismatch(f"{what} have types that do not fit each other: {terms[0].type} and {term.type}", at)
+                return None
+            found = merged(found, term.type)
+        if found.kind == "automaton":
+            self.mismatch(f"an automaton is no value, and {what} must be values", at)
+            return None
+        return found
+
+    def group(self, node: syntax.Group, items: list[Term], hint: CifType | None) -> Term:
         """The term of a tuple, list, set or dictionary of elements."""
         if any(item.type.kind == "unknown" for item in items):
             return ERROR
         if node.kind == "tuple":
-            type_ = CifType("tuple", parts=tuple(item.type for item in items), is_open=True)
-            whole = self.sized(type_, node.at)
+            if any(item.type.kind == "automaton" for item in items):
+                return self.mismatch("an automaton is no value, and those of a tuple must be values", node.at)
+            whole = self.sized(CifType("tuple", parts=tuple(item.type for item in items)), node.at)
             return ERROR if whole.kind == "unknown" else tuple_term(whole, tuple(items))
+        if not items:
+            if hint is None or hint.kind not in (("list",) if node.kind == "list" else ("set", "dict")):
+                return self.mismatch("nothing says what type this has", node.at,
+                                     "Write its type before it, as in '<list int>[]'.")  # fmt: skip
+            length = 0 if node.kind == "list" else None
+            return static(CifType(hint.kind, length, length, hint.parts), () if node.kind == "list" else frozenset())
         groups = [items[::2], items[1::2]] if node.kind == "dict" else [items]
         parts = []
         for group in groups:
-            part: CifType | None = UNKNOWN
-            for item in group:
-                part = joined(part, item.type) if part is not None else None
+            part = self.common(group, node.at, "the elements")
             if part is None:
-                return self.mismatch("the elements have types that do not fit each other", node.at)
+                return ERROR
             parts.append(part)
+        if node.kind != "list" and not parts[0].has_equality:
+            return self.mismatch(f"values {of_type(parts[0])} cannot be told apart", node.at)
         length = len(items) if node.kind == "list" else None
-        type_ = CifType(node.kind, length, length, tuple(parts), is_open=True)
+        type_ = self.sized(CifType(node.kind, length, length, tuple(parts)), node.at)
         if not all(item.is_static for item in items):
             return broken(type_, *items, problem=Problem(f"this makes a {node.kind} of values of a state", node.at))
-        expected = [parts[index % len(parts)] for index in range(len(items))]
-        values = [widened(item, part).value for item, part in zip(items, expected, strict=True)]
+        values = [item.value for item in items]
         if node.kind == "dict":
             if len(set(values[::2])) < len(items) // 2:
-                return self.mismatch("two keys of this dictionary are the same", node.at, "Leave one of them out.")
+                return self.failed(type_, "two keys of this dictionary are the same", node.at)
             return static(type_, frozenset(zip(values[::2], values[1::2], strict=True)))
         return static(type_, tuple(values) if node.kind == "list" else frozenset(values))
 
@@ -321,18 +352,18 @@ class Operators:
         """The term of a value that is cast to a type."""
         if "unknown" in (term.type.kind, type_.kind):
             return ERROR
-        if is_compatible(term.type, type_) and term.type.kind != "automaton":
-            return widened(term, declared(type_, term.type))
+        if is_equal(term.type, type_) and term.type.kind != "automaton":
+            return retyped(term, type_)
         pairs = {("int", "real"), ("bool", "string"), ("int", "string"), ("real", "string"), ("automaton", "string"),
                  ("string", "bool"), ("string", "int"), ("string", "real")}  # fmt: skip
-        if (term.type.kind, type_.kind) not in pairs:
+        if (term.type.kind, type_.kind) not in pairs or (type_.kind == "int" and type_.low is not None):
             return self.mismatch(f"{term.type} cannot be cast to {type_}", node.at)
         if not term.is_static:
             return broken(type_, term, problem=Problem(f"a value of a state is cast to {type_}", node.at))
         try:
             return _cast_value(term, type_)
         except ValueError:
-            return self.mismatch(f"{term.value!r} is not {type_}", node.at)
+            return self.failed(type_, f"{term.value!r} is not {type_}", node.at)
 
 
 def of_type(type_: CifType) -> str:
@@ -395,4 +426,4 @@ def _cast_value(term: Term, type_: CifType) -> Term:
     found = int(value)
     if not MINIMUM_INTEGER <= found <= MAXIMUM_INTEGER:
         raise ValueError(value)
-    return number(found)
+    return static(type_, found)

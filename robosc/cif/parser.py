@@ -14,7 +14,7 @@ from functools import partial
 
 from robosc.cif import syntax
 from robosc.cif.cursor import Fault, Stop
-from robosc.cif.expression_parser import ExpressionParser
+from robosc.cif.function_parser import FunctionParser
 from robosc.cif.reserved_words import INPUT_OUTPUT, ROLES
 from robosc.cif.tokens import Kind
 from robosc.errors import LanguageError
@@ -52,13 +52,13 @@ def parse(file: SourceFile) -> syntax.Specification:
     return syntax.Specification(file.name, body)
 
 
-class Parser(ExpressionParser):
+class Parser(FunctionParser):
     """Parser of a file."""
 
     def specification(self) -> Declarations:
         """Read the whole file; what comes of it is of use only if there are no findings."""
         try:
-            self._annotations("@@")
+            self.annotations("@@")
             body = self._group_body(is_file=True)
             if self.kinds[self.place] != _END:
                 self._head_fault("a declaration")
@@ -119,12 +119,12 @@ class Parser(ExpressionParser):
         return tuple(found)
 
     def _group_declaration(self) -> Declarations:
-        self._annotations("@")
+        self.annotations("@")
         word, following = self.texts[self.place], self.texts[self.place + 1]
         if self.kinds[self.place] == _NAME:
             return (self._instance(),)
         if word == "func":
-            return (self._function(),)
+            return (self.function(),)
         if word == "group":
             return (self._component(),)
         if word == "automaton" or (word in ROLES and (following in ("automaton", "def") or self._is_automaton())):
@@ -185,7 +185,7 @@ class Parser(ExpressionParser):
         return tuple(found)
 
     def _automaton_declaration(self, *, has_location: bool) -> Declarations:
-        self._annotations("@")
+        self.annotations("@")
         word = self.texts[self.place]
         if word == "location":
             return (self._location(),)
@@ -199,25 +199,6 @@ class Parser(ExpressionParser):
         if word == "disc":
             return self._discrete()
         return self._declaration("a declaration or a location")
-
-    # Annotations
-
-    def _annotations(self, sign: str) -> None:
-        """Read annotations and leave them aside."""
-        while self.kinds[self.place] == _ANNOTATION:
-            if self.texts[self.place].startswith("@@") != (sign == "@@"):
-                # One of the other kind is for the declaration behind it, or means nothing here.
-                return
-            self.place += 1
-            if not self.takes("("):
-                continue
-            while not self.takes(")"):
-                if self.kinds[self.place] == _NAME and self.texts[self.place + 1] == ":":
-                    self.place += 2
-                self.expression()
-                if not self.takes(","):
-                    self.take(")")
-                    break
 
     # Declarations
 
@@ -270,7 +251,7 @@ class Parser(ExpressionParser):
         self.take("=")
 
         def literal() -> syntax.Identifier:
-            self._annotations("@")
+            self.annotations("@")
             return self.identifier()
 
         return (syntax.Enum(name, self._listed(literal)),)
@@ -340,9 +321,7 @@ class Parser(ExpressionParser):
         def one() -> syntax.Declaration:
             name = self.identifier()
             value = self.expression() if self.takes("=") else None
-            if self.takes("der"):
-                self.expression()
-            return syntax.Continuous(name, value)
+            return syntax.Continuous(name, value, self.expression() if self.takes("der") else None)
 
         return self._listed(one)
 
@@ -437,7 +416,7 @@ class Parser(ExpressionParser):
 
         def element() -> None:
             is_annotated = self.kinds[self.place] == _ANNOTATION
-            self._annotations("@@")
+            self.annotations("@@")
             word = self.texts[self.place]
             if word == "edge":
                 edges.append(self._edge())
@@ -498,7 +477,7 @@ class Parser(ExpressionParser):
     def _update(self) -> syntax.Update:
         at = self.here
         if not self.sees("if"):
-            address = self._address()
+            address = self.address()
             self.take(":=")
             return syntax.Assignment(address, self.expression(), at)
         self.deeper()
@@ -516,24 +495,6 @@ class Parser(ExpressionParser):
         self.take(":")
         return guards, self._updates()
 
-    def _address(self) -> syntax.Expression:
-        at = self.here
-        if self.takes("("):
-            self.deeper()
-            items = [self._address()]
-            self.take(",")
-            items.append(self._address())
-            while self.takes(","):
-                items.append(self._address())
-            self.take(")")
-            self.shallower()
-            return syntax.Group("tuple", tuple(items), at)
-        found: syntax.Expression = self.name()
-        while self.takes("["):
-            found = syntax.Index(found, self.expression(), at)
-            self.take("]")
-        return found
-
     # Definitions
 
     def _parameters(self) -> tuple[syntax.Parameter, ...]:
@@ -550,7 +511,7 @@ class Parser(ExpressionParser):
 
     def _parameter_group(self) -> list[syntax.Parameter]:
         """Read parameters of one kind."""
-        self._annotations("@")
+        self.annotations("@")
         word = self.texts[self.place]
         if word in _EVENT_WORDS:
             controllability, data = self._event_head()
@@ -577,91 +538,3 @@ class Parser(ExpressionParser):
             found.append(syntax.Parameter(syntax.ParameterKind.EVENT, name, data, controllability, flags))
             if not self.takes(","):
                 return found
-
-    # Functions
-
-    def _function(self) -> syntax.Function:
-        try:
-            self.take("func")
-            results = [self.type()]
-            while self.takes(","):
-                results.append(self.type())
-            name = self.identifier()
-            self.take("(")
-            parameters: list[tuple[syntax.Identifier, syntax.Type]] = []
-            if not self.takes(")"):
-                while True:
-                    self._annotations("@")
-                    type_ = self.type()
-                    parameters += [(parameter, type_) for parameter in self.identifiers()]
-                    if not self.takes(";"):
-                        break
-                self.take(")")
-            self.take(":")
-            self._function_body()
-        except Fault:
-            raise Stop from None
-        return syntax.Function(name, tuple(results), tuple(parameters))
-
-    def _function_body(self) -> None:
-        if self.kinds[self.place] == int(Kind.STRING):
-            self.place += 1
-            self.take(";")
-            return
-        while not self._is_statement():
-            self._annotations("@")
-            self.type()
-            while True:
-                self.identifier()
-                if self.takes("="):
-                    self.expression()
-                if not self.takes(","):
-                    break
-            self.take(";")
-        self._statements("end")
-        self.take("end")
-
-    def _is_statement(self) -> bool:
-        """Return True if no variable of the function comes next: its name would follow its type."""
-        kind, word = self.kinds[self.place], self.texts[self.place]
-        if kind == _NAME:
-            return self.kinds[self.place + 1] != _NAME
-        return word in ("return", "break", "continue", "while", "if", "(")
-
-    def _statements(self, *closing: str) -> None:
-        self._statement()
-        while self.texts[self.place] not in closing:
-            self._statement()
-
-    def _statement(self) -> None:
-        if self.takes("return"):
-            self.expressions()
-            self.take(";")
-        elif self.takes("break") or self.takes("continue"):
-            self.take(";")
-        elif self.sees("while") or self.sees("if"):
-            self._block()
-        else:
-            self._address()
-            while self.takes(","):
-                self._address()
-            self.take(":=")
-            self.expressions()
-            self.take(";")
-
-    def _block(self) -> None:
-        """Read a statement that holds others."""
-        self.deeper()
-        is_choice = self.sees("if")
-        self.place += 1
-        self.expressions()
-        self.take(":")
-        self._statements(*(("elif", "else", "end") if is_choice else ("end",)))
-        while is_choice and self.takes("elif"):
-            self.expressions()
-            self.take(":")
-            self._statements("elif", "else", "end")
-        if is_choice and self.takes("else"):
-            self._statements("end")
-        self.take("end")
-        self.shallower()

@@ -115,6 +115,7 @@ class PendingInstance:
     container: "Scope"
     made: "Scope | None" = None
     has_failed: bool = False
+    is_being_made: bool = False
     kind = "a component"
 
     @property
@@ -157,6 +158,7 @@ class Scope:
         parameters: Names of its parameters.
         body: Declarations in order, those of merged groups one after the other.
         is_real: False in a definition that is checked without an instance.
+        is_function: True for a function, which uses its own variables, constants, types and functions alone.
         files: Files that have a part of a group.
     """
 
@@ -171,6 +173,7 @@ class Scope:
     parameters: set[str] = field(default_factory=set)
     body: list[syntax.Declaration] = field(default_factory=list)
     is_real: bool = True
+    is_function: bool = False
     files: set[str] = field(default_factory=set)
 
     @property
@@ -192,6 +195,13 @@ class Scope:
 
 
 type Item = Entity | Definition | Scope
+
+
+def allows(parameter: syntax.Parameter, use: str) -> bool:
+    """Return True if the flags of an event parameter allow a use: `!`, `?`, or `~` for events without either."""
+    if parameter.type is None:
+        return use == "~"
+    return not parameter.flags or use in parameter.flags
 
 
 class Scopes:
@@ -324,10 +334,14 @@ class Scopes:
 
     def _made(self, item: PendingInstance) -> Scope | None:
         """The scope of an instance; None if there is none, which has been reported."""
-        if item.made is None and not item.has_failed:
-            item.has_failed = True
+        if item.is_being_made:
+            name = item.instance.definition
+            self._error("cif-cycle", f"what '{name}' means depends on '{item.instance.name.text}' itself", name.at,
+                        "Name a definition.")  # fmt: skip
+        elif item.made is None and not item.has_failed:
+            item.is_being_made = True
             item.made = self._instantiated(item)
-            item.has_failed = item.made is None
+            item.is_being_made, item.has_failed = False, item.made is None
         return item.made
 
     def _instantiated(self, item: PendingInstance) -> Scope | None:
@@ -417,7 +431,7 @@ class Scopes:
                 return Entity(place, scope, parameter.name)
         assert scope.parent is not None  # noqa: S101 - a definition stands somewhere
         found = self._definition(parameter, scope)
-        if not isinstance(found, Definition) or found.component in scope.ancestry:
+        if found is None or found.component in scope.ancestry:
             return Scope(parameter.name.text, scope.parent, parameter.name.at, is_real=False)
         made = self._new_scope(found, scope.absolute(parameter.name.text), parameter.name.at, scope)
         for inner in found.component.parameters or ():
@@ -428,12 +442,27 @@ class Scopes:
 
     # Looking up
 
-    def _definition(self, parameter: syntax.Parameter, scope: Scope) -> "Item | None":
+    def _definition(self, parameter: syntax.Parameter, scope: Scope) -> Definition | None:
         """Return what a component parameter of an instance must be an instance of, which an instance may hold."""
         assert parameter.definition is not None  # noqa: S101 - a component's parameter names a definition
         assert scope.parent is not None  # noqa: S101 - a definition stands somewhere
-        is_own = parameter.definition.parts[0] == parameter.name.text
-        return self.resolve(parameter.definition, scope.parent if is_own else scope, is_type=True)
+        found = self.resolve(parameter.definition, scope.parent, is_type=True)
+        if found is not None and not isinstance(found, Definition):
+            self._wrong_kind(parameter.definition, found, "a definition")
+            return None
+        return found
+
+    def parameter(self, name: syntax.Name, scope: Scope) -> tuple[syntax.Parameter | None, "Scope | None"]:
+        """Return the parameter that a name is, and the scope that its type is written in; None if it is none."""
+        if len(name.parts) > 1 or name.root is syntax.Root.SPECIFICATION:
+            return None, None
+        found: Scope | None = scope.root if name.root is syntax.Root.SCOPE else scope
+        while found is not None and name.parts[0] not in found.entries:
+            found = found.parent
+        if found is None or found.definition is None or name.parts[0] not in found.parameters:
+            return None, None
+        parameters = found.definition.component.parameters or ()
+        return next(item for item in parameters if item.name.text == name.parts[0]), found.parent
 
     def resolve(self, name: syntax.Name, scope: Scope, *, is_type: bool = False) -> "Item | None":
         """Return what a name means where it is written; None if nothing, which has been reported.
@@ -456,14 +485,16 @@ class Scopes:
             self._unknown(first, name, scope)
             return None
         found = self._target(start.entries[first])
+        through_instance = False
         for part in others:
             if found is None:
                 return None
             if not isinstance(found, Scope):
                 self._unknown(part, name, None)
                 return None
+            through_instance = through_instance or found.definition is not None
             entry = None if part in found.parameters else found.entries.get(part)
-            if entry is None or (isinstance(entry, Definition) and found.definition is not None and not is_type):
+            if entry is None or (isinstance(entry, Definition) and through_instance and not is_type):
                 self._unknown(part, name, found)
                 return None
             found = self._target(entry)
@@ -494,7 +525,9 @@ class Scopes:
             definition = self._definition(parameter, alias.scope)
             if definition is None:
                 return None
-            if isinstance(found, Scope) and found.definition is definition:
+            made_from = found.definition if isinstance(found, Scope) else None
+            # Each instance around a definition has one of its own.
+            if made_from is not None and made_from.component is definition.component:
                 return found
             self._error("cif-arguments", f"'{argument}' is not an instance of '{parameter.definition}'", argument.at,
                         f"Give an instance of '{parameter.definition}'.")  # fmt: skip
@@ -504,19 +537,14 @@ class Scopes:
             self._error("cif-arguments", f"'{argument}' is {found.kind}, and '{parameter.name.text}' takes {wanted}",
                         argument.at, f"Give the name of {wanted}.")  # fmt: skip
             return None
-        declaration = found.declaration
-        wanted_word = parameter.is_controllable
-        if isinstance(declaration, syntax.Event) and wanted_word not in (None, declaration.is_controllable):
-            word = "controllable" if wanted_word else "uncontrollable"
-            self._error("cif-arguments", f"'{argument}' is not {word}, as '{parameter.name.text}' must be",
-                        argument.at, f"Give a {word} event, or leave the word out of the parameter.")  # fmt: skip
         return found
 
-    def check_arguments(self, scope: Scope) -> None:
-        """Look up every argument of an instance, used or not."""
-        for entry in scope.entries.values():
-            if isinstance(entry, Alias):
-                self._target(entry)
+    def function(self, item: syntax.Function, scope: Scope) -> Scope:
+        """The scope of a function's parameters and variables."""
+        made = Scope(scope.absolute(item.name.text), scope, item.name.at, is_real=False, is_function=True)
+        for name, type_ in (*item.parameters, *((name, type_) for name, type_, _ in item.variables)):
+            self._add(made, name, Entity(syntax.Discrete(name, type_, (), is_any=False), made, name))
+        return made
 
     def target(self, entry: "Item | Alias | PendingInstance") -> "Item | None":
         """The thing that an entry of a scope stands for."""
@@ -525,7 +553,7 @@ class Scopes:
     def _unknown(self, part: str, name: syntax.Name, scope: Scope | None) -> None:
         known: set[str] = set()
         while scope is not None:
-            known.update(key for key in scope.entries if " " not in key)
+            known.update(key for key in scope.entries if " " not in key and key != part)
             scope = scope.parent if len(name.parts) == 1 or part == name.parts[0] else None
         near = did_you_mean(part, known)
         whole = f" of '{name}'" if len(name.parts) > 1 else ""

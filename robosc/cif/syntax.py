@@ -218,10 +218,11 @@ class Discrete(msgspec.Struct, frozen=True, gc=False):
 
 
 class Continuous(msgspec.Struct, frozen=True, gc=False):
-    """`cont name;`; its derivative is not kept."""
+    """`cont name = value der derivative;`."""
 
     name: Identifier
     value: Expression | None
+    derivative: Expression | None
 
 
 class Equation(msgspec.Struct, frozen=True, gc=False):
@@ -269,11 +270,44 @@ class Invariant(msgspec.Struct, frozen=True, gc=False):
 
 
 class Function(msgspec.Struct, frozen=True, gc=False):
-    """A function that a user has defined; its body is read and left aside."""
+    """A function that a user has defined.
+
+    Attributes:
+        name: Its name.
+        results: Types of what it returns.
+        parameters: Its parameters.
+        variables: Its variables, with their initial values.
+        statements: Its statements; none of one that is defined outside of the specification.
+    """
 
     name: Identifier
     results: tuple[Type, ...]
     parameters: tuple[tuple[Identifier, Type], ...]
+    variables: "tuple[tuple[Identifier, Type, Expression | None], ...]"
+    statements: "tuple[Statement, ...]"
+
+
+class Return(msgspec.Struct, frozen=True, gc=False):
+    """`return value;` in a function; several values are a tuple."""
+
+    value: Expression
+    at: Location
+
+
+class Leave(msgspec.Struct, frozen=True, gc=False):
+    """`break;` or `continue;` in a function."""
+
+    word: str
+    at: Location
+
+
+class Block(msgspec.Struct, frozen=True, gc=False):
+    """`if` (`is_choice`) or `while` in a function, with the statements of each branch."""
+
+    is_choice: bool
+    branches: "tuple[tuple[tuple[Expression, ...], tuple[Statement, ...]], ...]"
+    otherwise: "tuple[Statement, ...]"
+    at: Location
 
 
 class InputOutput(msgspec.Struct, frozen=True, gc=False):
@@ -359,6 +393,7 @@ class IfUpdate(msgspec.Struct, frozen=True, gc=False):
 
 
 type Update = Assignment | IfUpdate
+type Statement = Assignment | Return | Leave | Block
 
 
 class Edge(msgspec.Struct, frozen=True, gc=False):

@@ -11,8 +11,8 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from robosc.cif.types import BOOL, REAL, UNKNOWN, CifType, integer
-from robosc.expressions import Binary, Conditional, Constant, EnumValue, Expression, Unary, children
+from robosc.cif.types import BOOL, UNKNOWN, CifType, integer
+from robosc.expressions import MINIMUM_INTEGER, Binary, Conditional, Constant, EnumValue, Expression, Unary, children
 from robosc.source import Location
 
 MAXIMUM_SIZE = 20_000
@@ -138,9 +138,9 @@ def conditional(condition: Term, then: Term, otherwise: Term, type_: CifType) ->
     if "unknown" in (condition.type.kind, then.type.kind, otherwise.type.kind):
         return ERROR
     if condition.is_static:
-        return widened(then if condition.value else otherwise, type_)
+        return retyped(then if condition.value else otherwise, type_)
     if type_.kind == "tuple" and not condition.problems:
-        pairs = zip(tuple_parts(widened(then, type_)), tuple_parts(widened(otherwise, type_)), type_.parts, strict=True)
+        pairs = zip(tuple_parts(retyped(then, type_)), tuple_parts(retyped(otherwise, type_)), type_.parts, strict=True)
         parts = tuple(conditional(condition, one, other, part) for one, other, part in pairs)
         return tuple_term(type_, parts)
     if not (condition.is_usable and then.is_usable and otherwise.is_usable):
@@ -171,37 +171,12 @@ def tuple_term(type_: CifType, parts: tuple[Term, ...]) -> Term:
     return Term(type_, parts=parts, problems=tuple(found), size=size, depth=depth)
 
 
-def widened(term: Term, type_: CifType) -> Term:
-    """A term as one of a type that it fits: its integers become real where reals are expected."""
+def retyped(term: Term, type_: CifType) -> Term:
+    """A term as one of the type that is declared for it."""
     if "unknown" in (term.type.kind, type_.kind):
         return ERROR
-    if term.is_static:
-        return replace(term, type=type_, value=_converted(term.value, term.type, type_))
-    if term.parts:
-        parts = tuple(widened(part, expected) for part, expected in zip(term.parts, type_.parts, strict=True))
-        return replace(term, type=type_, parts=parts)
-    if type_.kind == "real" and term.type.kind == "int":
-        return replace(term, type=REAL, expression=None)
-    return replace(term, type=type_)
-
-
-def _has_reals(type_: CifType) -> bool:
-    return type_.kind == "real" or any(map(_has_reals, type_.parts))
-
-
-def _converted(value: Any, type_: CifType, target: CifType) -> Any:
-    """A static value of one type as one of another that it fits."""
-    if type_.kind == "int" and target.kind == "real":
-        return float(value)
-    if type_.kind not in ("list", "set", "dict", "tuple") or not _has_reals(target):
-        return value
-    if type_.kind in ("tuple", "dict"):
-        pairs = tuple(zip(type_.parts, target.parts, strict=True))
-        rows = [value] if type_.kind == "tuple" else value
-        made = [tuple(_converted(item, *pair) for item, pair in zip(row, pairs, strict=True)) for row in rows]
-        return made[0] if type_.kind == "tuple" else frozenset(made)
-    items = (_converted(item, type_.parts[0], target.parts[0]) for item in value)
-    return tuple(items) if type_.kind == "list" else frozenset(items)
+    parts = tuple(retyped(part, expected) for part, expected in zip(term.parts, type_.parts, strict=bool(term.parts)))
+    return replace(term, type=type_, parts=parts)
 
 
 def values_of(type_: CifType, most: int) -> list[Any] | None:
@@ -283,14 +258,15 @@ def result_range(operator: str, left: tuple[int, int], right: tuple[int, int]) -
         case "*":
             corners = (a * c, a * d, b * c, b * d)
             return min(corners), max(corners)
-    divisors = {item for item in (c, d, -1 if c <= -1 <= d else 0, 1 if c <= 1 <= d else 0) if item}
+    divisors = {item for item in (c, d, *(near for near in (-2, -1, 1) if c <= near <= d)) if item}
     if operator == "div":
-        results = {quotient(item, divisor) for item in (a, b) for divisor in divisors}
-        if a <= 0 <= b or not results:
-            results.add(0)
+        # The least integer has no opposite: what divides it by -1 fails.
+        dividends = {a, b, *(near for near in (MINIMUM_INTEGER + 1,) if a <= near <= b)}
+        results = {quotient(*pair) for pair in product(dividends, divisors) if pair != (MINIMUM_INTEGER, -1)}
         return min(results), max(results)
-    largest = max(abs(item) for item in (c, d)) - 1
-    return (max(a, -largest) if a < 0 else 0), (min(b, largest) if b > 0 else 0)
+    # Wider than it must be, as CIF has it.
+    largest = max(abs(c), abs(d)) - 1
+    return (-largest if a < 0 else 0), (largest if b >= 0 else 0)
 
 
 def rounded(a: float) -> int:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from operator import eq
 
 from robosc.expressions import MAXIMUM_INTEGER, MINIMUM_INTEGER
 
@@ -18,7 +19,6 @@ class CifType:
         parts: Types that it is made of.
         names: Literals of an enum, in order, or fields of a tuple.
         name: Name of an enum.
-        is_open: True for a container that is written out: its elements become what is expected of them.
         size: Number of types that it is made of, itself included.
     """
 
@@ -28,7 +28,6 @@ class CifType:
     parts: tuple["CifType", ...] = ()
     names: tuple[str, ...] = ()
     name: str = ""
-    is_open: bool = field(compare=False, default=False)
     size: int = field(init=False, compare=False, default=1)
 
     def __post_init__(self) -> None:
@@ -41,11 +40,15 @@ class CifType:
 
     @property
     def range(self) -> tuple[int, int]:
-        """Least and greatest integer."""
-        return (
-            MINIMUM_INTEGER if self.low is None else self.low,
-            MAXIMUM_INTEGER if self.high is None else self.high,
-        )
+        """Least and greatest integer, or length of a list."""
+        if self.low is None or self.high is None:
+            return (0 if self.kind == "list" else MINIMUM_INTEGER), MAXIMUM_INTEGER
+        return self.low, self.high
+
+    @property
+    def has_equality(self) -> bool:
+        """True if values of it can be compared."""
+        return self.kind not in ("func", "dist", "void", "automaton") and all(part.has_equality for part in self.parts)
 
     @property
     def is_finite(self) -> bool:
@@ -84,84 +87,63 @@ def integer(low: int, high: int) -> CifType:
     return CifType("int", low, high)
 
 
-def _related(value: CifType, target: CifType, ranges: Callable[[CifType, CifType], bool], *, widens: bool) -> bool:
+Relation = Callable[[tuple[int, int], tuple[int, int]], bool]
+"""Question about two ranges of integers, or about lengths of lists."""
+
+
+def _is_within(value: tuple[int, int], target: tuple[int, int]) -> bool:
+    return target[0] <= value[0] and value[1] <= target[1]
+
+
+def _meets(value: tuple[int, int], target: tuple[int, int]) -> bool:
+    return value[0] <= target[1] and target[0] <= value[1]
+
+
+def _related(value: CifType, target: CifType, relation: Relation) -> bool:
     """Return True if values of one type may stand for those of another, by what is asked of their ranges."""
     if "unknown" in (value.kind, target.kind):
         return True
-    if value.kind == "int" and target.kind == "real":
-        return widens
-    if _is_empty(value) and target.kind == "dict":
-        return True
     if value.kind != target.kind or len(value.parts) != len(target.parts):
         return False
-    if (value.kind == "enum" and value.names != target.names) or not ranges(value, target):
+    if value.kind == "enum" and value.names != target.names:
         return False
+    if value.kind in ("int", "list") and not relation(value.range, target.range):
+        return False
+    # The result of a function that is assigned must fit wherever it is called.
+    first = _is_within if value.kind == "func" and relation is _meets else relation
     pairs = zip(value.parts, target.parts, strict=True)
-    return all(_related(one, other, ranges, widens=value.is_open) for one, other in pairs)
-
-
-def _is_empty(type_: CifType) -> bool:
-    """Return True for the type of `{}`, which is a set or a dictionary."""
-    return type_.is_open and type_.kind == "set" and type_.parts[0].kind == "unknown"
-
-
-def _is_within(value: CifType, target: CifType) -> bool:
-    if value.kind not in ("int", "list") or target.low is None:
-        return True
-    if value.low is None and value.kind == "list":
-        return False
-    return target.range[0] <= value.range[0] and value.range[1] <= target.range[1]
-
-
-def _meets(value: CifType, target: CifType) -> bool:
-    return value.kind != "int" or max(value.range[0], target.range[0]) <= min(value.range[1], target.range[1])
+    return all(_related(*pair, relation if place else first) for place, pair in enumerate(pairs))
 
 
 def is_compatible(one: CifType, other: CifType) -> bool:
     """Return True if two types are equal, ranges and names aside."""
-    return _related(one, other, lambda _, __: True, widens=False)
+    return _related(one, other, lambda _, __: True)
+
+
+def is_equal(one: CifType, other: CifType) -> bool:
+    """Return True if two types are equal, names aside."""
+    return _related(one, other, eq)
 
 
 def fits(value: CifType, target: CifType) -> bool:
     """Return True if every value of a type is one of another: what constants and arguments need."""
-    return _related(value, target, _is_within, widens=True)
+    return _related(value, target, _is_within)
 
 
 def overlaps(value: CifType, target: CifType) -> bool:
     """Return True if an expression of one type may be assigned to a variable of another."""
-    return _related(value, target, _meets, widens=True)
+    return _related(value, target, _meets)
 
 
-def joined(one: CifType, other: CifType, *, widens: tuple[bool, bool] = (True, True)) -> CifType | None:
-    """The type of values of two types, such as those of the branches of an `if`; None if there is none.
-
-    Args:
-        one: First type.
-        other: Second type.
-        widens: True for each of them whose integers may become reals.
-    """
+def merged(one: CifType, other: CifType) -> CifType:
+    """The type of values of two compatible types, such as those of the branches of an `if`; fields lose their names."""
     if "unknown" in (one.kind, other.kind):
         return other if one.kind == "unknown" else one
-    if {one.kind, other.kind} == {"int", "real"}:
-        return REAL if widens[one.kind == "real"] else None
-    if _is_empty(one) and other.kind == "dict":
-        return other
-    if _is_empty(other) and one.kind == "dict":
-        return one
-    if one.kind != other.kind or len(one.parts) != len(other.parts):
-        return None
-    if one.kind == "enum" and one.names != other.names:
-        return None
     low = high = None
-    if one.kind in ("int", "list") and one.low is not None and other.low is not None:
+    if one.low is not None and other.low is not None:
         low, high = min(one.low, other.low), max(one.range[1], other.range[1])
-    pairs = zip(one.parts, other.parts, strict=True)
-    parts = [joined(a, b, widens=(one.is_open, other.is_open)) for a, b in pairs]
-    known = tuple(part for part in parts if part is not None)
-    if len(known) < len(parts):
-        return None
-    names = one.names or other.names
-    return CifType(one.kind, low, high, known, names, one.name, is_open=one.is_open and other.is_open)
+    parts = tuple(map(merged, one.parts, other.parts))
+    return CifType(one.kind, low, high, parts, one.names if one.kind == "enum" else (), one.name)
 
 
 def declared(written: CifType, value: CifType) -> CifType:

@@ -1,10 +1,13 @@
 """Types of CIF's names: the type of each declaration, with its static value or the expression that it becomes."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from robosc.cif import syntax
 from robosc.cif.expression_typing import NAMELESS, ExpressionTyping
 from robosc.cif.scopes import Entity, Scope, Scopes
-from robosc.cif.terms import ERROR, Problem, Term, broken, made, static, tuple_term, widened
-from robosc.cif.types import AUTOMATON, BOOL, REAL, UNKNOWN, CifType, declared, fits
+from robosc.cif.terms import ERROR, Problem, Term, broken, made, retyped, static, tuple_term
+from robosc.cif.types import BOOL, REAL, UNKNOWN, CifType, declared, fits
 from robosc.expressions import ITSELF, StateTest, VariableRead
 from robosc.source import Location
 
@@ -14,6 +17,10 @@ class Typing(ExpressionTyping):
 
     Args:
         scopes: The scopes.
+
+    Attributes:
+        depends: Entities that the value of an algebraic variable reads, or that decide how something begins
+            or whether a location is initial, with the places where that is read.
     """
 
     def __init__(self, scopes: Scopes) -> None:
@@ -22,6 +29,7 @@ class Typing(ExpressionTyping):
         self._types: dict[Entity, CifType | None] = {}
         self._fields: dict[Scope, set[str]] = {}
         self._enums: dict[tuple[str, ...], str] = {}
+        self.depends: dict[Entity | Scope, dict[Entity | Scope, Location]] = {}
 
     # Types
 
@@ -53,6 +61,13 @@ class Typing(ExpressionTyping):
                 self.error("cif-type", "a tuple has two fields or more", written.at,
                            "Write the type of its field alone, or add a field.")  # fmt: skip
                 return UNKNOWN
+        if written.kind in ("set", "dict") and not (parts[0].has_equality or parts[0].kind == "unknown"):
+            self.error("cif-type", f"values of type {parts[0]} cannot be told apart", written.at, "Use another type.")
+            return UNKNOWN
+        if written.kind == "dist" and parts[0] not in (BOOL, CifType("int"), REAL, UNKNOWN):
+            self.error("cif-type", f"distributions have no samples of type {parts[0]}", written.at,
+                       "Use 'bool', 'int' or 'real'.")  # fmt: skip
+            return UNKNOWN
         return self._operators.sized(CifType(written.kind, parts=parts, names=fields), written.at)
 
     def _named(self, name: syntax.Name, scope: Scope) -> CifType:
@@ -62,8 +77,6 @@ class Typing(ExpressionTyping):
         if isinstance(found, Entity) and isinstance(found.declaration, syntax.Enum) and not found.is_literal:
             return self.enum(found)
         if not isinstance(found, Entity) or not isinstance(found.declaration, syntax.TypeDeclaration):
-            if isinstance(found, Scope):
-                return AUTOMATON
             self.scopes.wrong_kind(name, found, "a type")
             return UNKNOWN
         if found in self._types:
@@ -90,7 +103,8 @@ class Typing(ExpressionTyping):
             case syntax.TypeDeclaration(name=name):
                 self._named(syntax.Name((name.text,), syntax.Root.HERE, name.at), entity.scope)
             case syntax.Event(data=syntax.Type() as data):
-                self.type(data, entity.scope)
+                is_parameter = entity.identifier.text in entity.scope.parameters
+                self.type(data, (entity.scope.parent if is_parameter else None) or entity.scope)
             case syntax.Event() | syntax.Invariant() | syntax.LocationDeclaration():
                 pass
             case _:
@@ -100,13 +114,23 @@ class Typing(ExpressionTyping):
         """The term of something declared."""
         if entity not in self._terms:
             self._terms[entity] = None
-            self._terms[entity] = self._declared(entity)
+            with self.depending(entity):
+                self._terms[entity] = self._declared(entity)
         found = self._terms[entity]
         if found is None:
-            self._cycle("the value of", entity)
+            # Without an instance, a circle of algebraic variables is none yet.
+            if entity.scope.is_real or not isinstance(entity.declaration, syntax.Algebraic):
+                self._cycle("the value of", entity)
             self._terms[entity] = ERROR
             return ERROR
         return found
+
+    @contextmanager
+    def depending(self, node: Entity | Scope) -> Iterator[None]:
+        """Remember what expressions read as what a node depends on."""
+        outer, self.reads = self.reads, self.depends.setdefault(node, {})
+        yield
+        self.reads = outer
 
     def _declared(self, entity: Entity) -> Term:
         declaration, scope = entity.declaration, entity.scope
@@ -132,19 +156,7 @@ class Typing(ExpressionTyping):
         raise AssertionError(declaration)
 
     def _constant(self, type_: CifType, value: syntax.Expression, scope: Scope) -> Term:
-        outer, self._operators.is_evaluating = self._operators.is_evaluating, True
-        term = self.term(value, scope)
-        self._operators.is_evaluating = outer
-        if "unknown" in (term.type.kind, type_.kind):
-            return ERROR
-        if not fits(term.type, type_):
-            return self.mismatch(f"{term.type} does not fit {type_}", value.at)
-        if term.problems:
-            return broken(type_, term)
-        if not term.is_static:
-            return self.mismatch("the value of a constant must be known beforehand", value.at,
-                                 "Use literals and other constants.")  # fmt: skip
-        return widened(term, declared(type_, term.type))
+        return self._fitted(self.evaluated(value, scope, type_), type_, value.at)
 
     def _variable(self, entity: Entity, type_: CifType) -> Term:
         scope, name = entity.scope, entity.identifier.text
@@ -174,13 +186,14 @@ class Typing(ExpressionTyping):
 
     def _algebraic(self, entity: Entity, declaration: syntax.Algebraic) -> Term:
         scope = entity.scope
-        # The type of a parameter is one of the definition's words; its argument is one of the instance's.
-        type_ = self.type(declaration.type, scope)
+        # The type of a parameter is written around the definition; its argument is one of the instance's words.
+        is_parameter = entity.value_scope is not None and scope.parent is not None
+        type_ = self.type(declaration.type, scope.parent if is_parameter and scope.parent else scope)
         if entity.value_scope is not None:
             if entity.value is None:
                 # A parameter of a definition without an instance: any value.
                 return broken(type_, problem=Problem(f"'{entity.name}' has no value", entity.at))
-            return self._fitted(self.term(entity.value, entity.value_scope), type_, entity.value.at)
+            return self._fitted(self.term(entity.value, entity.value_scope, type_), type_, entity.value.at)
         values = [(None, declaration.value)] if declaration.value is not None else []
         values += [(None, item.value) for item in scope.body
                    if isinstance(item, syntax.Equation) and item.name.text == entity.identifier.text]  # fmt: skip
@@ -193,19 +206,17 @@ class Typing(ExpressionTyping):
             self.error("cif-structure", f"the algebraic variable '{entity.name}' has {count}", entity.at, fix)
             return ERROR
         if values:
-            return self._fitted(self.term(values[0][1], scope), type_, values[0][1].at)
-        terms = [(place, self._fitted(self.term(value, scope), type_, value.at)) for place, value in located]
-        found = terms[-1][1]
-        for place, term in reversed(terms[:-1]):
-            found = self._operators.choice(self.location(scope, place), term, found, place.at)
-        return found
+            return self._fitted(self.term(values[0][1], scope, type_), type_, values[0][1].at)
+        self.reads.setdefault(scope, entity.at)
+        terms = [self._fitted(self.term(value, scope, type_), type_, value.at) for _, value in located]
+        return self._chosen([self.location(scope, place) for place, _ in located[:-1]], terms, entity.at)
 
     def _fitted(self, term: Term, type_: CifType, at: Location) -> Term:
         if "unknown" in (term.type.kind, type_.kind):
             return ERROR
         if not fits(term.type, type_):
             return self.mismatch(f"{term.type} does not fit {type_}", at)
-        return widened(term, declared(type_, term.type))
+        return retyped(term, declared(type_, term.type))
 
     def _cycle(self, what: str, entity: Entity) -> None:
         self.error("cif-cycle", f"{what} '{entity.name}' is defined by itself", entity.at, "Break the circle.")

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from robosc.cif import syntax
 from robosc.cif.scopes import Entity, Scope
-from robosc.cif.terms import ERROR, Term, broken, conditional, flat, tuple_parts, widened
-from robosc.cif.types import overlaps
+from robosc.cif.terms import ERROR, Term, broken, conditional, flat, retyped, tuple_parts, tuple_term
+from robosc.cif.types import CifType, overlaps
 from robosc.cif.typing import Typing
 from robosc.expressions import VariableRead
 from robosc.source import Location
@@ -44,8 +44,12 @@ class Updates:
         found: dict[str, New] = {}
         for item in items:
             if isinstance(item, syntax.Assignment):
-                term = self.typing.term(item.value, scope)
-                made = self._assigned(item.address, term, scope)
+                own = self._addressed(item.address, scope)
+                term = self.typing.term(item.value, scope, own.type)
+                is_fit = "unknown" in (own.type.kind, term.type.kind) or overlaps(term.type, own.type)
+                if not is_fit:
+                    self.typing.mismatch(f"{term.type} does not fit {own.type}", item.address.at)
+                made = self._assigned(item.address, own, term if is_fit else ERROR)
             else:
                 made = self._if_update(item, scope)
             self._join(found, made)
@@ -55,8 +59,11 @@ class Updates:
         """Add assignments to others, unless they assign the same."""
         both = [made[name] for name in made if name in found]
         for text, at in dict.fromkeys((new.text, new.at) for new in both):
-            self.typing.error("cif-assignment", f"'{text}' is assigned twice", at, "Assign it once.")
+            self._assigned_twice(text, at)
         found.update(made)
+
+    def _assigned_twice(self, text: str, at: Location) -> None:
+        self.typing.error("cif-assignment", f"'{text}' is assigned twice", at, "Assign it once.")
 
     def _if_update(self, item: syntax.IfUpdate, scope: Scope) -> dict[str, New]:
         branches = [(self.typing.conjunction(guards, scope), self.assigned(updates, scope))
@@ -74,49 +81,48 @@ class Updates:
             found[name] = New(term, at, first.old, first.text)
         return found
 
-    def _assigned(self, address: syntax.Expression, term: Term, scope: Scope) -> dict[str, New]:
+    def _assigned(self, address: syntax.Expression, own: Term, term: Term) -> dict[str, New]:
         """The variables of an address, with their values."""
-        if isinstance(address, syntax.Group):
-            return self._several(address.items, term, scope, address.at)
-        own = self._addressed(address, scope)
         if "unknown" in (own.type.kind, term.type.kind):
             return {}
-        if not overlaps(term.type, own.type):
-            self.typing.mismatch(f"{term.type} does not fit {own.type}", address.at)
-            return {}
+        found: dict[str, New] = {}
+        if isinstance(address, syntax.Group):
+            for item, old, new in zip(address.items, tuple_parts(own), tuple_parts(term), strict=True):
+                self._join(found, self._assigned(item, old, new))
+            return found
         if own.problems:
             # A variable that synthesis does not take has been reported where it is declared.
             return {}
-        found = {}
-        for old, new in zip(flat(own), flat(widened(term, own.type)), strict=True):
+        for old, new in zip(flat(own), flat(retyped(term, own.type)), strict=True):
             assert isinstance(old.expression, VariableRead)  # noqa: S101 - a variable, or a field of one
             found[old.expression.variable] = New(new, address.at, old, _text(address))
         return found
 
-    def _several(self, items: tuple[syntax.Expression, ...], term: Term, scope: Scope, at: Location) -> dict[str, New]:
-        if term.type.kind == "tuple" and len(term.type.parts) == len(items):
-            parts = tuple_parts(term)
-        else:
-            if term.type.kind != "unknown":
-                self.typing.mismatch(f"{term.type} has not {len(items)} parts", at)
-            parts = tuple(ERROR for _ in items)
-        found: dict[str, New] = {}
-        for item, part in zip(items, parts, strict=True):
-            self._join(found, self._assigned(item, part, scope))
-        return found
-
     def _addressed(self, address: syntax.Expression, scope: Scope) -> Term:
-        """The variable that is assigned, or the part of one."""
+        """The variable that is assigned, the part of one, or several."""
+        if isinstance(address, syntax.Group):
+            items = tuple(self._addressed(item, scope) for item in address.items)
+            # Variables that synthesis does not take have no values to join.
+            known: set[str] = set()
+            for item, term in zip(address.items, items, strict=True):
+                if isinstance(item, syntax.Name) and term.problems:
+                    if str(item) in known:
+                        self._assigned_twice(str(item), item.at)
+                    known.add(str(item))
+            if any(item.type.kind == "unknown" for item in items):
+                return ERROR
+            return tuple_term(CifType("tuple", parts=tuple(item.type for item in items)), items)
         if isinstance(address, syntax.Index):
             base = self._addressed(address.base, scope)
             if base.type.kind == "tuple":
                 return self.typing.field(address, base, scope)
-            index = self.typing.term(address.index, scope)
-            is_list = base.type.kind == "list" and index.type.kind in ("int", "unknown")
-            is_entry = base.type.kind == "dict" and overlaps(index.type, base.type.parts[0])
-            if base.type.kind == "unknown" or is_list or is_entry:
-                return broken(base.type.parts[-1], base) if base.type.parts else ERROR
-            return self.typing.mismatch(f"{base.type} has no element {index.type}", address.at)
+            index = self.typing.term(address.index, scope, base.type.parts[0] if base.type.kind == "dict" else None)
+            if "unknown" in (base.type.kind, index.type.kind):
+                return ERROR
+            if base.type.kind == "string":
+                return self.typing.mismatch("a part of a text cannot be assigned", address.at, "Assign all of it.")
+            is_fit = self.typing.has_index(base.type, index.type, address.at)
+            return broken(base.type.parts[-1], base) if is_fit else ERROR
         assert isinstance(address, syntax.Name)  # noqa: S101 - there are no other addresses
         entity = self.scopes.resolve(address, scope)
         if entity is None:

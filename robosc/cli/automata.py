@@ -197,14 +197,18 @@ def verify(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> Ex
     from robosc.signatures import SignatureError
 
     model, options = loaded_for_verification(arguments), synthesis_options(arguments)
-    # A server has no option for it.
-    is_controller = getattr(arguments, "controller", False)
-    if arguments.supervisor is None and is_controller:
-        found = _verified_controller(arguments, model, options)
-    elif arguments.supervisor is None:
-        found = machine.verify(model, options, maximum_states=arguments.limit, is_strict=arguments.strict)
+    if arguments.supervisor is None:
+        found = machine.verify(
+            model,
+            options,
+            maximum_states=arguments.limit,
+            is_strict=arguments.strict,
+            controller=arguments.controller,
+            as_is=arguments.as_is,
+        )
     else:
         refuse(machine is not THIS_MACHINE, NO_FILE)
+        refuse(arguments.as_is, "--as-is: the supervisor is FILE.rsup")
         try:
             found = _verified(arguments, model, options)
         except (InvalidSupervisorError, SignatureError) as error:
@@ -222,21 +226,6 @@ def verify(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> Ex
         if not (found.passed and arguments.quiet):
             sys.stdout.write(system_verification_text(found.report))
     return ExitCode.OK if found.passed else ExitCode.FAILED
-
-
-def _verified_controller(
-    arguments: argparse.Namespace, model: "LoadedAutomata", options: "SynthesisOptions"
-) -> "Verification":
-    """Verify the supervisor that is synthesized, with the controller properties."""
-    from robosc.pipeline.automata_models import automata_verification
-    from robosc.verification import Limits
-
-    limits = Limits.of(arguments.limit)
-    return watched(
-        lambda report: automata_verification(
-            model, options, limits, report, lambda: False, is_strict=arguments.strict, controller=True
-        )
-    )
 
 
 def _verified(arguments: argparse.Namespace, model: "LoadedAutomata", options: "SynthesisOptions") -> "Verification":
@@ -265,7 +254,7 @@ def _verified(arguments: argparse.Namespace, model: "LoadedAutomata", options: "
             report,
             lambda: False,
             is_strict=arguments.strict,
-            controller=getattr(arguments, "controller", False),
+            controller=arguments.controller,
         )
     )
 
@@ -288,6 +277,7 @@ def generate(
         GenerateOptions(package=package),
         synthesis_options(arguments),
         initial=arguments.initial,
+        is_modular=arguments.modular,
     )
     require_supported(made)
     return model, made

@@ -13,7 +13,7 @@ from robosc.cli.arguments import (
     engine_options,
     read_bundle,
 )
-from robosc.cli.output import ExitCode, ProgressLine, print_json
+from robosc.cli.output import ExitCode, ProgressLine, UsageError, print_json
 from robosc.errors import UnsupportedModelError
 from robosc.json_documents import diagnostics_json
 from robosc.model.structure import Deployment
@@ -30,6 +30,7 @@ examples:
   robosc explain-synthesis robot.rscd --event move                    why move.request is restricted, or never happens
   robosc explain-synthesis robot.rscd --event move --state "Door.closed, Lift.n = 2"
   robosc explain-synthesis robot.rscd --after "up, Lift.tau_1"        what can happen then, and why the rest cannot
+  robosc explain-synthesis large.rscd --event move --modular          in each module that has move, for large robots
   robosc explain-synthesis plant.cif --event lane.start               the same for CIF models (.gen, .wmod)
 """
 
@@ -72,10 +73,28 @@ def add_question_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--after", metavar="EVENTS", help="explain what can happen after this run: events separated by commas"
     )
+    parser.add_argument(
+        "--modular",
+        action="store_true",
+        help="explain events of a robot in each module of a synthesis in modules that has them, by runs of it alone",
+    )
+
+
+def refuse_modular(arguments: argparse.Namespace) -> None:
+    """Do nothing unless something that is about the whole is to be explained in modules.
+
+    Raises:
+        UsageError: It is.
+    """
+    if arguments.modular and automata.is_given(arguments):
+        raise UsageError("--modular explains robots in modules: automata are explained as a whole")
+    if arguments.modular and (arguments.state is not None or arguments.after is not None):
+        raise UsageError("--modular explains events: leave it out with --state and --after, which are about the whole")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Synthesize and explain; 0 with a supervisor, 1 without."""
+    refuse_modular(arguments)
     if automata.is_given(arguments):
         return automata.explain_synthesis(arguments)
     return run_with(arguments, lambda bundle: _explained(arguments, bundle))
@@ -129,7 +148,7 @@ def _explained(arguments: argparse.Namespace, bundle: Bundle) -> "Explained":
             bundle,
             Deployment(arguments.deployment),
             engine_options(arguments),
-            ExplanationSubject(arguments.event, arguments.state, arguments.after),
+            ExplanationSubject(arguments.event, arguments.state, arguments.after, arguments.modular),
             lambda step: progress.show(step.message),
         )
     finally:

@@ -152,6 +152,7 @@ def add_generate_arguments(parser: argparse.ArgumentParser) -> None:
         "controller-config.json; json). Nodes for ROS 1 have the text only",
     )
     add_initial_argument(parser)
+    synth.add_modular_argument(parser)
     parser.add_argument("--force", action="store_true", help="overwrite generated files even where you changed them")
 
 
@@ -176,7 +177,7 @@ def run(arguments: argparse.Namespace) -> int:
         return report_generated(arguments, made, made.files, model)
     refuse_initial(arguments)
     bundle = read_bundle(arguments)
-    outcome = synth.make(arguments, bundle, allow_livelock=arguments.allow_livelock)
+    outcome = synth.make(arguments, bundle, allow_livelock=arguments.allow_livelock, is_modular=arguments.modular)
     generation = generation_of(outcome, arguments.target, options)
     return report_generated(arguments, generation, generation.files, bundle)
 

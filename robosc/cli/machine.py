@@ -41,9 +41,16 @@ class Machine(Protocol):
         """Return the graph of the controlled system."""
 
     def verify(
-        self, model: "LoadedAutomata", options: "SynthesisOptions", *, maximum_states: int, is_strict: bool
+        self,
+        model: "LoadedAutomata",
+        options: "SynthesisOptions",
+        *,
+        maximum_states: int,
+        is_strict: bool,
+        controller: bool,
+        as_is: bool,
     ) -> "Verification":
-        """Synthesize the supervisor, and verify it."""
+        """Synthesize the supervisor, unless automata are verified `as_is`, and verify it."""
 
     def generate(
         self,
@@ -53,6 +60,7 @@ class Machine(Protocol):
         options: "SynthesisOptions",
         *,
         initial: str | None,
+        is_modular: bool,
     ) -> "Generation":
         """Generate the files of a target."""
 
@@ -97,14 +105,27 @@ class ThisMachine:
         return watched(lambda report: explore(model, options, maximum_states=maximum_states, on_progress=report))
 
     def verify(
-        self, model: "LoadedAutomata", options: "SynthesisOptions", *, maximum_states: int, is_strict: bool
+        self,
+        model: "LoadedAutomata",
+        options: "SynthesisOptions",
+        *,
+        maximum_states: int,
+        is_strict: bool,
+        controller: bool,
+        as_is: bool,
     ) -> "Verification":
-        """Synthesize the supervisor, and verify it."""
+        """Synthesize the supervisor, unless automata are verified `as_is`, and verify it."""
         from robosc.pipeline.verifying import verify
 
         return watched(
             lambda report: verify(
-                model, options=options, maximum_states=maximum_states, is_strict=is_strict, on_progress=report
+                model,
+                options=options,
+                maximum_states=maximum_states,
+                is_strict=is_strict,
+                controller=controller,
+                as_is=as_is,
+                on_progress=report,
             )
         )
 
@@ -116,11 +137,16 @@ class ThisMachine:
         options: "SynthesisOptions",
         *,
         initial: str | None,
+        is_modular: bool,
     ) -> "Generation":
         """Generate the files of a target."""
         from robosc.pipeline.generating import generate
 
-        return watched(lambda report: generate(model, target, generation, options, initial=initial, on_progress=report))
+        return watched(
+            lambda report: generate(
+                model, target, generation, options, initial=initial, is_modular=is_modular, on_progress=report
+            )
+        )
 
     def explain(
         self,

@@ -22,7 +22,6 @@ from robosc.cli.arguments import (
 from robosc.cli.output import (
     ExitCode,
     ProgressLine,
-    UsageError,
     print_diagnostics,
     print_json,
     require_other_file,
@@ -82,7 +81,7 @@ def add_modular_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--modular",
         action="store_true",
-        help="synthesize automata in modules: for systems of many parts, of which one diagram cannot hold the states",
+        help="synthesize in modules: for robots and automata of many parts, of which each requirement is about few",
     )
 
 
@@ -99,25 +98,17 @@ def run(arguments: argparse.Namespace) -> int:
 
     if automata.is_given(arguments):
         return automata.synth(arguments)
-    refuse_modular(arguments)
     require_other_file(arguments.output, arguments.model)
     bundle = read_bundle(arguments)
     allow_livelock, verify_limit = arguments.allow_livelock, arguments.verify_limit
-    outcome, seconds = timed(lambda: make(arguments, bundle, allow_livelock=allow_livelock, verify_limit=verify_limit))
+    is_modular = arguments.modular
+    outcome, seconds = timed(
+        lambda: make(arguments, bundle, allow_livelock=allow_livelock, is_modular=is_modular, verify_limit=verify_limit)
+    )
     if outcome.supervisor is not None and arguments.output is not None:
         write_bytes(arguments.output, encode(outcome.supervisor))
     figures = Figures(outcome.statistics, seconds) if arguments.statistics else None
     return report_written(arguments, outcome, bundle, figures)
-
-
-def refuse_modular(arguments: argparse.Namespace) -> None:
-    """Do nothing unless a robot's model is to be synthesized in modules.
-
-    Raises:
-        UsageError: It is.
-    """
-    if arguments.modular:
-        raise UsageError("--modular is for automata (FILE.cif, .gen, .wmod): a robot's model is synthesized as a whole")
 
 
 def make(
@@ -126,6 +117,7 @@ def make(
     *,
     allow_livelock: bool,
     only_shown: bool = False,
+    is_modular: bool = False,
     verify_limit: int = SYNTHESIS_STATES,
 ) -> "SynthesisOutcome":
     """Synthesize as the arguments say, with a progress line on a terminal."""
@@ -140,6 +132,7 @@ def make(
             verify_limit=verify_limit,
             allow_livelock=allow_livelock,
             only_shown=only_shown,
+            is_modular=is_modular,
             on_progress=lambda step: progress.show(f"{step.stage}: {step.message}"),
         )
     finally:

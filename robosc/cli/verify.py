@@ -37,7 +37,8 @@ With --signed-by: the file must be signed by that key, too; without MODEL, nothi
 With properties: verify them in the robot under its supervisor, which is synthesized unless a file is given and passes,
 with a run that shows why each of them holds or fails.
 With automata (FILE.cif, .gen, .wmod): synthesize their supervisor, unless they have one, and verify it by other means
-than it was made; with --controller also bounded and finite response, confluence and nonblocking under control.
+than it was made; with --controller also bounded and finite response, confluence and nonblocking under control. With
+--as-is nothing is synthesized.
 """
 
 
@@ -71,15 +72,25 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="the supervisor file must be signed by a key of this file (may be repeated); without MODEL, that alone is "
         "checked",
     )
+    add_automata_arguments(parser)
+    parser.add_argument("-q", "--quiet", action="store_true", help="print what is wrong and nothing else")
+    add_engine_options(parser)
+    parser.set_defaults(run=run)
+
+
+def add_automata_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments that are for automata alone."""
     parser.add_argument(
         "--controller",
         action="store_true",
         help="of automata: check that code that runs them responds in bounded time (with the bounds), in the same way "
         "whatever the order of controllable events, and gets to marked states",
     )
-    parser.add_argument("-q", "--quiet", action="store_true", help="print what is wrong and nothing else")
-    add_engine_options(parser)
-    parser.set_defaults(run=run)
+    parser.add_argument(
+        "--as-is",
+        action="store_true",
+        help="of automata: synthesize nothing, and verify them as they stand, with requirements for their supervisor",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -90,8 +101,6 @@ def run(arguments: argparse.Namespace) -> int:
     """
     if automata.is_given(arguments):
         return automata.verify(arguments)
-    if arguments.controller:
-        raise UsageError("--controller is for automata (.cif, .gen, .wmod): of a robot, synth checks its controller")
     return run_with(arguments, _verify_supervisor, properties.run)
 
 
@@ -110,6 +119,10 @@ def run_with(
     Raises:
         UsageError: As `run`.
     """
+    if arguments.controller:
+        raise UsageError("--controller is for automata (.cif, .gen, .wmod): of a robot, synth checks its controller")
+    if arguments.as_is:
+        raise UsageError("--as-is is for automata (.cif, .gen, .wmod): a robot has a supervisor only by synthesis")
     has_properties = bool(arguments.property or arguments.properties)
     if arguments.supervisor is None and arguments.model.suffix == ".rsup":
         if arguments.signed_by and not has_properties:

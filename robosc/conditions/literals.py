@@ -1,6 +1,6 @@
 """Tests that a place of the state has one of some values, in the model's words, with their lengths."""
 
-from collections.abc import Collection, Hashable, Iterable, Iterator
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator
 from functools import cached_property
 from typing import Literal
 
@@ -20,7 +20,7 @@ from robosc.expressions import (
     Value,
     VariableRead,
 )
-from robosc.expressions.text import expression_text
+from robosc.expressions.text import cif_text, expression_text
 from robosc.supervisor.diagram import Domains, Subject, SubjectDomain
 
 Indices = tuple[range, ...]
@@ -68,15 +68,18 @@ class Vocabulary:
     Args:
         domains: Values that the places can hold.
         components: Names of all components; needed where texts are shown.
+        is_cif: True if texts are in CIF's notation.
 
     Attributes:
         domains: The same.
+        is_cif: The same.
         ranks: Position of each place in the model's text.
     """
 
-    def __init__(self, domains: Domains, components: Collection[str] = ()) -> None:
+    def __init__(self, domains: Domains, components: Collection[str] = (), *, is_cif: bool = False) -> None:
         self.domains = domains
         self._components = components
+        self.is_cif = is_cif
         self.ranks: dict[Subject, int] = {subject: rank for rank, subject in enumerate(domains)}
         self._known: dict[tuple[Subject, Indices], Membership] = {}
 
@@ -86,20 +89,42 @@ class Vocabulary:
         values = ((subject, item.type, item[:]) for subject, item in self.domains.items())
         # A range may be wide, and is not listed.
         places = tuple((*place, found if isinstance(found, range) else tuple(found)) for *place, found in values)
-        return places, frozenset(self._components)
+        return _Hashed((places, frozenset(self._components), self.is_cif))
 
     def test(self, subject: Subject, indices: Indices) -> Membership:
         """The shortest test whether a place holds one of some values: some, but not all that it can hold."""
         found = self._known.get((subject, indices))
         if found is None:
-            found = self._known[subject, indices] = membership(
-                subject, self.domains[subject], indices, self._components
-            )
+            found = self._known[subject, indices] = membership(subject, self.domains[subject], indices, self._text)
         return found
+
+    def _text(self, expression: Expression) -> str:
+        return cif_text(expression) if self.is_cif else expression_text(expression, self._components)
+
+
+class _Hashed:
+    """A value whose hash is worked out once: that of all places of a large robot takes as long as a search.
+
+    Args:
+        value: The value.
+    """
+
+    def __init__(self, value: Hashable) -> None:
+        self._value = value
+        self._hash = hash(value)
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Hashed) and self._value == other._value
 
 
 def membership(
-    subject: Subject, domain: SubjectDomain, indices: Indices, components: Collection[str] = ()
+    subject: Subject,
+    domain: SubjectDomain,
+    indices: Indices,
+    text: Callable[[Expression], str] = expression_text,
 ) -> Membership:
     """Return the shortest test whether a place holds one of some values: some, but not all that it can hold.
 
@@ -107,19 +132,21 @@ def membership(
         subject: The place.
         domain: Values that it can hold.
         indices: Indices of the values.
-        components: Names of all components; needed where the text is shown.
+        text: Function that writes a test; needed where the text is shown.
     """
-    inside = _membership("or", _one_of(subject, domain, indices), components)
-    outside = _membership("and", _none_of(subject, domain, _others(indices, len(domain))), components)
+    inside = _membership("or", _one_of(subject, domain, indices), text)
+    outside = _membership("and", _none_of(subject, domain, _others(indices, len(domain))), text)
     return min(inside, outside, key=lambda test: test.size)
 
 
-def _membership(operator: Literal["and", "or"], parts: list[Expression], components: Collection[str]) -> Membership:
-    texts = [expression_text(part, components) for part in parts]
+def _membership(
+    operator: Literal["and", "or"], parts: list[Expression], text: Callable[[Expression], str]
+) -> Membership:
+    texts = [text(part) for part in parts]
     if operator == "and" and len(parts) > 1:
         texts = [f"({text})" if _is_choice(part) else text for part, text in zip(parts, texts, strict=True)]
-    text = f" {operator} ".join(texts)
-    return Membership(operator, tuple(parts), text, (sum(map(operands, parts)), _length(text)))
+    whole = f" {operator} ".join(texts)
+    return Membership(operator, tuple(parts), whole, (sum(map(operands, parts)), _length(whole)))
 
 
 def _is_choice(part: Expression) -> bool:

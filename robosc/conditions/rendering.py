@@ -35,15 +35,23 @@ class Line(msgspec.Struct, frozen=True):
         number: Its number: the root is 1, and lines lead to later ones.
         cases: Tests of one place, each with its target if it is true.
         otherwise: Target if none is.
+        is_cif: True if its text is in CIF's notation.
     """
 
     number: int
     cases: tuple[tuple[Membership, Target], ...]
     otherwise: Target
+    is_cif: bool = False
 
     def __str__(self) -> str:
         if [target for _, target in self.cases] == [True] and self.otherwise is False:
             return f"[{self.number}] {_negated(self.cases[0][0].text)}"
+        if self.is_cif:
+            cases = "".join(
+                f"{'elif' if place else 'if'} {test.text}: {_target(target)} "
+                for place, (test, target) in enumerate(self.cases)
+            )
+            return f"[{self.number}] {cases}else {_target(self.otherwise)} end"
         cases = "".join(f"if {_negated(test.text)} then {_target(target)} else " for test, target in self.cases)
         return f"[{self.number}] {cases}{_target(self.otherwise)}"
 
@@ -186,7 +194,7 @@ def _line(
     is_decided = all(child < 2 for child in branches)
     *cases, (_, last) = sorted(tests, key=lambda case: (-case[1] if is_decided else 0, case[0].size))
     targets = tuple((test, _reached(child, numbers)) for test, child in cases)
-    return Line(number, targets, _reached(last, numbers))
+    return Line(number, targets, _reached(last, numbers), vocabulary.is_cif)
 
 
 def _reached(child: int, numbers: Mapping[int, int]) -> Target:

@@ -6,12 +6,14 @@ from collections.abc import Collection, Iterable, Sequence
 import msgspec
 
 from robosc.automata import System
+from robosc.automata.plants import communication_plant_name
 from robosc.conditions.goals import Formula, GoalInWords, assumption_text, goals_and_visits, goals_in_words
 from robosc.conditions.literals import Vocabulary
 from robosc.conditions.rendering import Formulas, diagram_lines, in_words, size_in_words
+from robosc.conditions.requirements import invariant_text, requirement_text
 from robosc.expressions import TRUE, Expression
 from robosc.model.structure import Model
-from robosc.supervisor import AddedCondition, Certificate, DecisionDiagram, Supervisor
+from robosc.supervisor import AddedCondition, Certificate, DecisionDiagram, Supervisor, certified_states
 from robosc.supervisor.diagram import diagram_domains
 
 _WIDTH = 100
@@ -19,6 +21,9 @@ _WIDTH = 100
 
 _NODES = 150
 """Nodes that the diagrams in a text for people may have together; a larger one is replaced by its size."""
+
+_RANGES = 600
+"""Ranges of values that the nodes of these diagrams may distinguish together: each is a test in the text."""
 
 FROM_THE_FIRST = ", to be read from [1] on:"
 """Words between a diagram's size and its nodes."""
@@ -53,8 +58,17 @@ def summary_json(supervisor: Supervisor) -> dict[str, object]:
         "communications": len(supervisor.model.communications),
         "requirements": len(supervisor.model.requirements) + len(supervisor.model.invariants),
         "state_invariants": len(supervisor.model.invariants),
-        "states": int(certificate.states),
+        "states": int(certificate.states) or None,
         "transitions": None if certificate.transitions is None else int(certificate.transitions),
+        "modules": [
+            {
+                "components": list(item.components),
+                "requirements": list(item.requirements),
+                "states": item.states,
+                "group": item.group,
+            }
+            for item in modules_in_words(supervisor)
+        ],
         "added": {event: condition_line(diagram, formula, components) for event, diagram, formula in added},
         "diagrams": {event: _diagram_json(diagram, vocabulary) for event, diagram, formula in added if formula is None},
         "goals": [_goal_json(goal, goals_vocabulary, components) for goal in goals_in_words(supervisor)],
@@ -103,10 +117,11 @@ def summary_text(supervisor: Supervisor) -> str:
         ("events", f"{len(system.events)}: {controllable} controllable, {len(system.events) - controllable} not"),
         ("variables", f"{synthesis + code_only}: {synthesis} in synthesis, {code_only} code-only"),
         ("requirements", _requirements(supervisor.model)),
-        ("controlled", f"{certificate.states} states{transitions}"),
+        ("controlled", f"{certified_states(certificate)}{transitions}"),
     ]
     lines = [f"{supervisor.model.name}: a supervisor exists ({supervisor.deployment})"]
     lines += [f"  {name:<13} {text}" for name, text in rows]
+    lines += [f"  {line}" for line in module_lines(supervisor)]
     lines.append("  the supervisor adds to each controllable event")
     lines += [f"    {line}" for line in added_lines(supervisor, system)]
     lines += [f"  {line}" for line in strategy_lines(supervisor)]
@@ -125,6 +140,60 @@ def summary_text(supervisor: Supervisor) -> str:
     lines.append(f"    {'method':<21} {certificate.method}")
     lines.append(f"    {'bundle SHA-256':<21} {certificate.bundle_sha256}")
     return "\n".join(lines) + "\n"
+
+
+class ModuleInWords(msgspec.Struct, frozen=True):
+    """A module of a modular synthesis in the words of the model.
+
+    Attributes:
+        components: The components that it has something of.
+        requirements: The requirements that are in it, wholly or partly.
+        states: Reachable states under its own supervisor.
+        group: Number of its group.
+    """
+
+    components: tuple[str, ...]
+    requirements: tuple[str, ...]
+    states: int
+    group: int
+
+
+def modules_in_words(supervisor: Supervisor) -> tuple[ModuleInWords, ...]:
+    """Return the modules of a supervisor in the words of its model."""
+    model, names = supervisor.model, _components(supervisor)
+    owners = {item.name: item.name for item in model.components}
+    owners |= {communication_plant_name(item): item.component for item in model.communications}
+    return tuple(
+        ModuleInWords(
+            tuple(dict.fromkeys(owners[name] for name in module.automata)),
+            (
+                *(requirement_text(model.requirements[number], names) for number in module.requirements),
+                *(invariant_text(model.invariants[number], names) for number in module.invariants),
+            ),
+            int(module.states),
+            module.group,
+        )
+        for module in supervisor.modules
+    )
+
+
+def module_lines(supervisor: Supervisor) -> list[str]:
+    """Return the modules of a supervisor for people, and which of them were found not to block each other."""
+    modules = modules_in_words(supervisor)
+    if not modules:
+        return []
+    lines = [f"it was synthesized in {len(modules)} module{'s' if len(modules) != 1 else ''}"]
+    for number, module in enumerate(modules, start=1):
+        rows = [f"{number}, {module.states} states: {', '.join(module.components)}", *module.requirements]
+        lines += [f"  {'  ' * (place > 0)}{line}" for place, row in enumerate(rows) for line in _wrapped(row)]
+    for group in sorted({module.group for module in modules}):
+        members = [str(number) for number, module in enumerate(modules, start=1) if module.group == group]
+        if len(members) > 1:
+            lines += [
+                f"  {line}"
+                for line in _wrapped(f"nonblocking together, as found on abstractions: {', '.join(members)}")
+            ]
+    return lines
 
 
 def added_texts(supervisor: Supervisor, system: System) -> dict[str, str]:
@@ -239,11 +308,13 @@ def _table(rows: Sequence[tuple[str, Sequence[str]]]) -> list[str]:
 
 
 def short_diagrams(diagrams: Iterable[DecisionDiagram]) -> set[DecisionDiagram]:
-    """Return those of some diagrams that a text writes node by node: the first ones that have few nodes together."""
-    found, left = set(), _NODES
+    """Return those of some diagrams that a text writes node by node: the first ones that are short together."""
+    found, nodes, ranges = set(), _NODES, _RANGES
     for diagram in diagrams:
-        if len(diagram.nodes) <= left:
-            left -= len(diagram.nodes)
+        tested = sum(len(node.starts) for node in diagram.nodes)
+        if len(diagram.nodes) <= nodes and tested <= ranges:
+            nodes -= len(diagram.nodes)
+            ranges -= tested
             found.add(diagram)
     return found
 

@@ -19,8 +19,9 @@ from robosc.automata.decision import Decision, Test, index_in
 from robosc.automata.executable import CALLED_KINDS, ExecutableEvent, ExecutableSystem, Moves, Participant
 from robosc.automata.plants import communication_plant, communication_plant_name
 from robosc.automata.state import Subject
+from robosc.conditions.requirements import requirement_text
 from robosc.errors import RoboscError
-from robosc.explanation.notation import MAXIMUM_NAMES, bracketed, cut, listed, requirement_text, value_text
+from robosc.explanation.notation import MAXIMUM_NAMES, bracketed, cut, listed, value_text
 from robosc.expressions import (
     BooleanType,
     DoubleType,

@@ -14,10 +14,10 @@ from robosc.automata.compile import NO_DATA, State, compile_expression, paths_re
 from robosc.automata.controlled import Added
 from robosc.automata.decision import Decision
 from robosc.automata.inputs import valuations
-from robosc.automata.state import Subject, subject_type, subjects, whole_names
+from robosc.automata.state import Subject, subject_type, subjects
 from robosc.explanation.notation import MAXIMUM_NAMES, bracketed, cut, listed, value_text
 from robosc.expressions import Expression, IntegerType, Unary
-from robosc.expressions.text import expression_text
+from robosc.expressions.text import cif_text
 
 
 class Disabled:
@@ -33,7 +33,6 @@ class Disabled:
         self._added = added
         self._subjects = subjects(system)
         self._places = {subject: place for place, subject in enumerate(self._subjects)}
-        self._names = whole_names(system)
         # The plants as if they could be anything.
         self._free = Semantics(replace(system, plant_invariants=()))
 
@@ -136,7 +135,7 @@ class Disabled:
         return compile_expression(condition, self._places)(state, NO_DATA) is True
 
     def _text(self, expression: Expression) -> str:
-        return cut(expression_text(expression, self._names))
+        return cut(cif_text(expression))
 
     def _values(self, expression: Expression, state: State) -> str:
         read = sorted(subjects_read(expression), key=self._places.__getitem__)

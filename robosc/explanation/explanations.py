@@ -242,7 +242,8 @@ class _Text:
 
     def _event(self, item: EventReport) -> Iterator[str]:
         kind = "" if item.is_controllable else " (uncontrollable)"
-        yield f"{item.event}{kind}: {self._statuses[item.status]}"
+        where = f", in the module of {', '.join(item.module)} alone" if item.module else ""
+        yield f"{item.event}{kind}{where}: {self._statuses[item.status]}"
         for reason in item.reasons:
             yield from _indented(self._reason(reason))
         if item.unfound:

@@ -133,6 +133,7 @@ class EventReport(msgspec.Struct, frozen=True):
         stopped: Way to where the behaviours would let it happen, for an event that they never let happen, and why
             that is stopped.
         unfound: Sentence in place of that way, where finding one takes too long; else empty.
+        module: Components of the module that is reported on alone, in a modular synthesis; else none.
     """
 
     event: str
@@ -141,6 +142,7 @@ class EventReport(msgspec.Struct, frozen=True):
     reasons: tuple[Reason, ...]
     stopped: Stopped | None = None
     unfound: str = ""
+    module: tuple[str, ...] = ()
 
 
 class EventHere(msgspec.Struct, frozen=True):

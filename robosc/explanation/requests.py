@@ -9,6 +9,7 @@ from robosc.automata.structure import System
 from robosc.errors import RoboscError
 from robosc.explanation.notation import value_text
 from robosc.expressions import (
+    ITSELF,
     Binary,
     BinaryOperator,
     BooleanType,
@@ -23,6 +24,7 @@ from robosc.expressions import (
     VariableRead,
     conjunction,
 )
+from robosc.expressions.text import literal_named
 from robosc.model.findings import did_you_mean
 from robosc.model.structure import Model
 from robosc.source import visible
@@ -110,6 +112,8 @@ class Requests(ABC):
                 return Constant(int(text))
         else:
             values = {value_text(value): value for value in subject_domain(self._system, subject)}
+            if isinstance(type_, EnumType):
+                text = literal_named(type_, text)
             if text in values:
                 return EnumValue(type_.name, text) if isinstance(type_, EnumType) else Constant(values[text])
         raise RequestError(
@@ -197,10 +201,12 @@ class SystemQuestionReader(Requests):
         rest = text[negated.end() :] if negated else text
         result = self._comparison(rest)
         if result is None:
+            # An input variable is no automaton to a user.
+            inputs = {item.automaton for item in self._known if item.variable == ITSELF}
             locations = [
                 f"{item.automaton}.{name}"
                 for item in self._known
-                if item.variable is None
+                if item.variable is None and item.automaton not in inputs
                 for name in subject_domain(self._system, item)
             ]
             variables = [str(item) for item in self._known if item.variable is not None]

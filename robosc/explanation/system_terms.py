@@ -8,8 +8,8 @@ from robosc.automata.state import Subject, whole_names
 from robosc.explanation.constraints import RelaxableConstraint
 from robosc.explanation.parts import Part, StateValues
 from robosc.explanation.terms import Terms
-from robosc.expressions import Expression, Unary
-from robosc.expressions.text import words_text
+from robosc.expressions import Expression, Type, Unary
+from robosc.expressions.text import cif_text, cif_type_text
 from robosc.source import Location
 
 
@@ -24,6 +24,7 @@ class SystemTerms(Terms):
     """
 
     plants = "plants"
+    edge = "edge for"
 
     def __init__(
         self,
@@ -39,7 +40,10 @@ class SystemTerms(Terms):
         self._required = "supervisor" if system.is_controlled else "requirement"
 
     def _text(self, expression: Expression) -> str:
-        return words_text(expression)
+        return cif_text(expression)
+
+    def _type_text(self, type_: Type) -> str:
+        return cif_type_text(type_)
 
     def state(self, state: State) -> StateValues:
         """A state: the location of each automaton with several locations, and the value of each variable."""

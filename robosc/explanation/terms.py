@@ -11,11 +11,12 @@ from robosc.automata.compile import NO_DATA, State, compile_expression, subjects
 from robosc.automata.plants import communication_plant_name
 from robosc.automata.state import Subject, subject_type, subjects
 from robosc.automata.structure import System
+from robosc.conditions.requirements import invariant_text, requirement_text
 from robosc.explanation.analysis import BlockingCause, BlockingCauseKind
 from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint
-from robosc.explanation.notation import MAXIMUM_NAMES, cut, requirement_text, value_text
+from robosc.explanation.notation import MAXIMUM_NAMES, cut, value_text
 from robosc.explanation.parts import Part, StateValues
-from robosc.expressions import TRUE, Expression, Value, type_text
+from robosc.expressions import TRUE, Expression, Type, Value, type_text
 from robosc.expressions.text import automaton_text, expression_text
 from robosc.model.places import Places
 from robosc.model.structure import CommunicationKind, EventKind, Model, is_tau
@@ -32,9 +33,11 @@ class Terms(ABC):
 
     Attributes:
         plants: Word for the plants.
+        edge: Words for an edge, before its event.
     """
 
     plants: str
+    edge = "transition on"
 
     def __init__(
         self, system: System, constraints: Sequence[RelaxableConstraint], whole_names: Collection[str]
@@ -81,6 +84,9 @@ class Terms(ABC):
     def _text(self, expression: Expression) -> str:
         return expression_text(expression, self._whole_names)
 
+    def _type_text(self, type_: Type) -> str:
+        return type_text(type_)
+
     # Events
 
     @abstractmethod
@@ -96,7 +102,7 @@ class Terms(ABC):
     def part(self, constraint: RelaxableConstraint) -> Part:
         """Return the part that a constraint is."""
         if constraint.range is not None:
-            text = f"the range of {constraint.range}: {type_text(subject_type(self._system, constraint.range))}"
+            text = f"the range of {constraint.range}: {self._type_text(subject_type(self._system, constraint.range))}"
             location = self._variable_place(constraint.range)
         elif constraint.marking is not None:
             text, location = self._marking(constraint.marking)
@@ -172,7 +178,7 @@ class Terms(ABC):
         edges = [edge for edge in self._system.automaton(name).edges if edge.event == event and edge.source == location]
         where = self._where(name, str(location))
         if not edges:
-            return f"{where} it has no transition on {event}"
+            return f"{where} it has no {self.edge} {event}"
         guards = [cut(self._text(edge.guard)) for edge in edges if edge.guard != TRUE]
         return f"{where} {' and '.join(guards[:MAXIMUM_NAMES])} is not true"
 
@@ -236,9 +242,7 @@ class ModelTerms(Terms):
             return text, self._places.requirements[number]
         if item.invariants:
             (place,) = item.invariants
-            invariant = self._model.invariants[place]
-            word = "never" if invariant.is_never else "always"
-            return f"requirement {word} {self._text(invariant.expression)}", self._places.invariants[place]
+            return invariant_text(self._model.invariants[place], self._whole_names), self._places.invariants[place]
         (place,) = item.conditions
         event = self._system.conditions[place].event
         name = event.rpartition(".")[0]

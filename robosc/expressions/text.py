@@ -21,6 +21,7 @@ from robosc.expressions.tree import (
     Unary,
     VariableRead,
 )
+from robosc.expressions.types import BooleanType, EnumType, IntegerType, Type, type_text
 
 _LEVELS = {
     "or": 1,
@@ -39,6 +40,7 @@ _LEVELS = {
     "mod": 7,
 }
 _NOT, _NEGATIVE, _OPERAND = 8, 9, 10
+_COMPARISONS = frozenset({"=", "!=", ">", ">=", "<", "<="})
 _IMPLIES = 0
 _CONDITIONAL = -1
 
@@ -72,14 +74,35 @@ def variable_text(component: str, variable: str) -> str:
     return variable if _SENTENCE.search(variable) else f"{component}.{variable}"
 
 
-def words_text(expression: Expression, components: Collection[str] = ()) -> str:
-    """The expression with the words of CIF, where they differ: `not`, and `if` with a colon and an `end`.
+def cif_text(expression: Expression) -> str:
+    """Return an expression about automata in CIF's notation.
 
-    Args:
-        expression: The expression.
-        components: Names of all components.
+    It has `not`, an `if` with a colon and an `end`, comparisons of one rank and literals of enums by absolute names.
+    Names of automata are whole.
     """
-    return _Printer(components, has_words=True).print(expression, 0)[0]
+    return _Printer((), is_cif=True).print(expression, 0)[0]
+
+
+def cif_type_text(type_: Type) -> str:
+    """Return the type of a variable of automata in CIF's notation."""
+    match type_:
+        case IntegerType(low=int(low), high=int(high)):
+            return f"int[{low}..{high}]"
+        case BooleanType():
+            return "bool"
+        case _:
+            return type_text(type_)
+
+
+def cif_literal(enum: str, value: str) -> str:
+    """Return the absolute name of a literal, which stands in the component that declares its enum."""
+    scope, dot, _ = enum.rpartition(".")
+    return f"{scope}{dot}{value}"
+
+
+def literal_named(type_: EnumType, text: str) -> str:
+    """Return the literal of an enum that goes by a name, its own or the absolute one; other texts as they are."""
+    return next((value for value in type_.values if text == cif_literal(type_.name, value)), text)
 
 
 def expression_text(expression: Expression, components: Collection[str] = ()) -> str:
@@ -101,9 +124,9 @@ def expression_text(expression: Expression, components: Collection[str] = ()) ->
 class _Printer:
     """Prints the expressions of one robot."""
 
-    def __init__(self, components: Collection[str], *, has_words: bool = False) -> None:
+    def __init__(self, components: Collection[str], *, is_cif: bool = False) -> None:
         self._components = components
-        self._has_words = has_words
+        self._is_cif = is_cif
 
     def print(self, expression: Expression, depth: int) -> tuple[str, int]:
         """The text and how tightly its outermost operator binds, inside `depth` quantifiers."""
@@ -115,12 +138,13 @@ class _Printer:
             case Constant(value=int(value) | float(value)):
                 text = _number(value)
                 return text, (_NEGATIVE if text.startswith("-") else _OPERAND)
-            case EnumValue(value=value):
-                return value, _OPERAND
+            case EnumValue(enum=enum, value=value):
+                return (cif_literal(enum, value) if self._is_cif else value), _OPERAND
             case VariableRead(component=component, variable=variable):
                 return variable_text(component, variable), _OPERAND
             case StateTest(component=component, state=state):
-                return f"{automaton_text(component, self._components)}.{state}", _OPERAND
+                name = component if self._is_cif else automaton_text(component, self._components)
+                return f"{name}.{state}", _OPERAND
             case Received(path=path):
                 return f"value{_steps(path)}", _OPERAND
             case Element(level=level, path=path):
@@ -135,23 +159,30 @@ class _Printer:
             case Conditional(condition=condition, then=then, otherwise=otherwise):
                 # No generator here: each of those that are open within each other takes a part of C's stack.
                 parts = [self.print(item, depth)[0] for item in (condition, then, otherwise)]
-                if self._has_words:
+                if self._is_cif:
                     return "if {}: {} else {} end".format(*parts), _OPERAND
                 return "if {} then {} else {}".format(*parts), _CONDITIONAL
+            case Unary(operator="holds", operand=operand) if self._is_cif:
+                # Every condition of automata is true or false.
+                return self.print(operand, depth)
             case Unary(operator="holds", operand=operand):
                 return f"holds({self.print(operand, depth)[0]})", _OPERAND
             case Unary(operator="not", operand=VariableRead(variable=variable)) if _SENTENCE.search(variable):
                 return _SENTENCE.sub(r"\1 \2 not ", variable, count=1), _OPERAND
             case Unary(operator="not", operand=operand):
-                return f"{'not ' if self._has_words else '!'}{self._within(operand, _NOT, depth)}", _NOT
+                return f"{'not ' if self._is_cif else '!'}{self._within(operand, _NOT, depth)}", _NOT
             case Unary(operand=operand):
                 return f"-{self._within(operand, _NEGATIVE, depth)}", _NEGATIVE
             case Binary(operator="implies", left=left, right=right):
                 # Its operands are literals, negations or parentheses, and it stands alone.
                 return f"{self._within(left, _NOT, depth)} => {self._within(right, _NOT, depth)}", _IMPLIES
             case Binary(operator=operator, left=left, right=right):
-                level = _LEVELS[operator]
-                return f"{self._within(left, level, depth)} {operator} {self._within(right, level + 1, depth)}", level
+                level = first = _LEVELS[operator]
+                if self._is_cif and operator in _COMPARISONS:
+                    # All have one rank; each in another is in parentheses, on the left as well.
+                    level, first = _LEVELS["="], _LEVELS["+"]
+                second = max(first, level + 1)
+                return f"{self._within(left, first, depth)} {operator} {self._within(right, second, depth)}", level
         raise TypeError(f"no expression: {expression!r}")
 
     def _part(self, part: ArrayPart, depth: int) -> str:

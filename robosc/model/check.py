@@ -442,7 +442,7 @@ class _RobotChecker:
                             f"the request of '{name}' makes this requirement false in '{component}', so it never "
                             "cancels it",
                             place,
-                            "Nothing needs fixing if that is meant.",
+                            "If that is meant, write '// robosc: accept request-leaves-requirement: REASON' above it.",
                         )
 
     def _check_results(self, model: Model) -> None:

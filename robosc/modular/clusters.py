@@ -38,15 +38,17 @@ def modules_of(partition: Partition, maximum_bits: float = MAXIMUM_BITS) -> tupl
         maximum_bits: Logarithm of the combinations of values up to which the requirements of a cluster share a module.
     """
     bits = _bits(partition)
+    # Parts with one state, such as that of a message, connect nothing.
+    solid = frozenset(place for place, number in enumerate(bits) if number)
     found: list[Module] = []
-    for demands in _by_cluster(partition):
-        for module in _connected(partition, demands):
+    for demands in _by_cluster(partition, solid):
+        for module in _connected(partition, demands, solid):
             if sum(bits[place] for place in module.parts) <= maximum_bits:
                 found.append(module)
             else:
                 found += [Module(partition.demands[place].parts, frozenset({place})) for place in module.demands]
     covered = {place for module in found for place in module.parts}
-    found += [Module(frozenset({place}), frozenset()) for place in range(len(partition.parts)) if place not in covered]
+    found += [Module(needed, frozenset()) for place, needed in enumerate(partition.needs) if place not in covered]
     return _without_smaller(found) or (Module(frozenset(), frozenset()),)
 
 
@@ -59,8 +61,8 @@ def _bits(partition: Partition) -> list[float]:
     return [sum(found[name] for name in part) for part in partition.parts]
 
 
-def _by_cluster(partition: Partition) -> list[list[int]]:
-    """The demands of each node of the tree: a demand stands at the lowest node that has all of its parts."""
+def _by_cluster(partition: Partition, solid: frozenset[int]) -> list[list[int]]:
+    """The demands of each node of the tree: a demand stands at the lowest node that has all of its solid parts."""
     left = [place for place, demand in enumerate(partition.demands) if demand.parts]
     found = [[place] for place, demand in enumerate(partition.demands) if not demand.parts]
     nodes = [frozenset({place}) for place in range(len(partition.parts))]
@@ -70,7 +72,8 @@ def _by_cluster(partition: Partition) -> list[list[int]]:
         weights = defaultdict[tuple[int, int], float](float)
         waiting: list[int] = []
         for place in left:
-            touched = sorted({node_of[part] for part in partition.demands[place].parts})
+            parts = partition.demands[place].parts
+            touched = sorted({node_of[part] for part in parts & solid or parts})
             if len(touched) == 1:
                 here[touched[0]].append(place)
                 continue
@@ -137,14 +140,14 @@ def _normalized(column: _Column) -> _Column:
     return {node: flow / total for node, flow in column.items()}
 
 
-def _connected(partition: Partition, demands: Iterable[int]) -> list[Module]:
-    """The demands as modules, of which no two share a part."""
+def _connected(partition: Partition, demands: Iterable[int], solid: frozenset[int]) -> list[Module]:
+    """The demands as modules, of which no two share a solid part."""
     found: list[Module] = []
     for place in demands:
         module = Module(partition.demands[place].parts, frozenset({place}))
         apart = []
         for other in found:
-            if other.parts & module.parts:
+            if other.parts & module.parts & solid:
                 module |= other
             else:
                 apart.append(other)

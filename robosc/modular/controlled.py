@@ -1,8 +1,9 @@
 """Modules under their supervisors, as automata for composition: each possible step of a part has one label."""
 
-from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
+from itertools import product
 
 from robosc.automata.compile import State
 from robosc.automata.controlled import ControlledGraph, controlled_graph
@@ -73,7 +74,7 @@ def _always_true(state: State) -> bool:
     return True
 
 
-def graphs_of(modules: Sequence[ControlledModule], part_of: dict[str, int]) -> list[Graph]:
+def graphs_of(modules: Sequence[ControlledModule], parts_of: Mapping[str, Set[int]]) -> list[Graph]:
     """The automata of modules, to be composed.
 
     A part that several modules share is in the same state in each of them. If an event, or the beginning, can lead such
@@ -81,16 +82,11 @@ def graphs_of(modules: Sequence[ControlledModule], part_of: dict[str, int]) -> l
 
     Args:
         modules: The modules.
-        part_of: The part of each event that belongs to one.
+        parts_of: The parts that have each event.
     """
     count = Counter(part for item in modules for part in item.module.parts)
     shared = {part for part in count if count[part] > 1}
-    open_events = {event for item in modules for event in _open_events(item, shared, part_of)}
-    labels = defaultdict[str, set[Label]](set)
-    for item in modules:
-        for steps in item.graph.steps:
-            for event, targets in steps:
-                labels[event].update(_label(item, event, target, open_events, part_of) for target in targets)
+    labels = _Labels(modules, shared, parts_of)
     begins = {
         part: {
             ("begin", part, item.values(part, number))
@@ -102,40 +98,66 @@ def graphs_of(modules: Sequence[ControlledModule], part_of: dict[str, int]) -> l
     }
     # Each module may leave one beginning, and another module another one.
     begins = {part: found for part, found in begins.items() if len(found) > 1}
-    return [_graph(item, labels, open_events, part_of, begins) for item in modules]
+    return [_graph(item, labels, begins) for item in modules]
 
 
 def _initial(item: ControlledModule) -> list[int]:
     return [number for number, parent in enumerate(item.graph.parents) if parent is None]
 
 
-def _open_events(item: ControlledModule, shared: set[int], part_of: dict[str, int]) -> Iterable[str]:
-    """The events of shared parts that can lead to several states of their part."""
+class _Labels:
+    """Labels of the steps of modules.
+
+    An event is open if it can lead a part that several modules share to several states.
+    """
+
+    def __init__(self, modules: Sequence[ControlledModule], shared: Set[int], parts_of: Mapping[str, Set[int]]) -> None:
+        # For each open event its open parts, and for each of these the states that it leads to.
+        self._outcomes: dict[str, dict[int, dict[tuple[object, ...], None]]] = {}
+        for item in modules:
+            for event, part in _open_events(item, shared, parts_of):
+                self._outcomes.setdefault(event, {}).setdefault(part, {})
+        for item in modules:
+            for steps in item.graph.steps:
+                for event, targets in steps:
+                    for part, found in self._outcomes.get(event, {}).items():
+                        if part in item.module.parts:
+                            found.update(dict.fromkeys(item.values(part, target) for target in targets))
+
+    def of(self, item: ControlledModule, event: str, target: int | None = None) -> list[Label]:
+        """The labels of a step of a module, one if it has all open parts; without a target all labels of an event."""
+        outcomes = self._outcomes.get(event)
+        if outcomes is None:
+            return [event]
+        choices = (
+            (item.values(part, target),) if target is not None and part in item.module.parts else tuple(found)
+            for part, found in sorted(outcomes.items())
+        )
+        return [(event, *choice) for choice in product(*choices)]
+
+
+def _open_events(
+    item: ControlledModule, shared: Set[int], parts_of: Mapping[str, Set[int]]
+) -> Iterable[tuple[str, int]]:
+    """The events that can lead a shared part of a module to several states, with the part."""
     for steps in item.graph.steps:
         for event, targets in steps:
-            part = part_of.get(event)
-            if part in shared and len(targets) > 1 and len({item.values(part, target) for target in targets}) > 1:
-                yield event
-
-
-def _label(item: ControlledModule, event: str, target: int, open_events: set[str], part_of: dict[str, int]) -> Label:
-    return (event, item.values(part_of[event], target)) if event in open_events else event
+            if len(targets) > 1:
+                for part in parts_of.get(event, frozenset()) & shared & item.module.parts:
+                    if len({item.values(part, target) for target in targets}) > 1:
+                        yield event, part
 
 
 def _graph(
     item: ControlledModule,
-    labels: dict[str, set[Label]],
-    open_events: set[str],
-    part_of: dict[str, int],
+    labels: _Labels,
     begins: dict[int, set[tuple[str, int, tuple[object, ...]]]],
 ) -> Graph:
     edges: Edges = [
-        [(_label(item, event, target, open_events, part_of), target) for event, targets in steps for target in targets]
+        [(label, target) for event, targets in steps for target in targets for label in labels.of(item, event, target)]
         for steps in item.graph.steps
     ]
-    alphabet: set[Label] = {
-        label for event in item.events for label in (labels[event] if event in open_events else {event})
-    }
+    alphabet: set[Label] = {label for event in item.events for label in labels.of(item, event)}
     mine = [part for part in begins if part in item.module.parts]
     alphabet.update(label for part in mine for label in begins[part])
     if not mine:

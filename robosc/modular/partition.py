@@ -1,11 +1,15 @@
 """Parts of a system that only requirements connect, and the parts that each requirement is about.
 
+Automata that share an event are in one part, unless they only hear it: it is uncontrollable, and all but one of them
+always accept it. Then each of them needs the part of the one that decides, and they need not know of each other.
+
 Source: M. Goorden, J. van de Mortel-Fronczak, M. Reniers, W. Fokkink and J. Rooda, "Structuring multilevel
 discrete-event systems with dependence structure matrices", IEEE TAC 65(4), 2020, pp. 1625-1639: product systems, and
 the mapping of requirements to them.
 """
 
-from collections.abc import Hashable, Iterable, Iterator
+from collections import defaultdict
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from robosc.automata.check import SystemPlaces
@@ -58,13 +62,24 @@ class Partition:
 
     Attributes:
         system: The system.
-        parts: Names of the automata of each part: no two parts share an event, and none reads another one.
-        demands: The demands, each of which connects some parts.
+        parts: Names of the automata of each part: none reads another one, and two parts share no event but those that
+            one of them, or another one that both need, decides alone.
+        demands: The demands, each of which connects some parts, with those that they need.
+        needs: For each part the parts that it needs, itself among them: those that decide on what it hears.
     """
 
     system: System
     parts: tuple[frozenset[str], ...]
     demands: tuple[Demand, ...]
+    needs: tuple[frozenset[int], ...]
+
+    def conditions_of(self, module: Module) -> tuple[int, ...]:
+        """Places of a module's event conditions among those of the system."""
+        return tuple(sorted(place for number in module.demands for place in self.demands[number].conditions))
+
+    def invariants_of(self, module: Module) -> tuple[int, ...]:
+        """Places of a module's invariants among those of the system."""
+        return tuple(sorted(place for number in module.demands for place in self.demands[number].invariants))
 
     def system_of(self, module: Module) -> System:
         """The synthesis problem of a module."""
@@ -78,10 +93,9 @@ class Partition:
         system = self.system
         automata = tuple(item for item in system.automata if item.name in names)
         events = {event for item in automata for event in item.alphabet}
-        conditions = sorted(place for demand in demands for place in demand.conditions)
-        conditions = [place for place in conditions if system.conditions[place].event in events]
+        conditions, invariants = self.conditions_of(module), self.invariants_of(module)
+        conditions = tuple(place for place in conditions if system.conditions[place].event in events)
         plant_conditions = [place for place, item in enumerate(system.plant_conditions) if item.event in events]
-        invariants = sorted(place for demand in demands for place in demand.invariants)
         problem = replace(
             system,
             events=tuple(item for item in system.events if item.name in events),
@@ -168,6 +182,7 @@ def partition(system: System) -> Partition:
     plants = _Plants(system)
     place_of = {name: place for place, part in enumerate(plants.parts) for name in part}
     part_of = {event: place_of[name] for event, name in plants.owners.items()}
+    needs = tuple(_needed(place, plants, place_of) for place in range(len(plants.parts)))
     elements = [
         *(
             _Element(
@@ -211,16 +226,28 @@ def partition(system: System) -> Partition:
         # Data that an event carries is the same for all that read it.
         for name in sorted(element.data):
             groups.join((first.setdefault(("data", name), number), number))
-    demands = tuple(_joined([elements[number] for number in group], plants.parts) for group in groups)
-    return Partition(system, plants.parts, demands)
+    demands = tuple(_joined([elements[number] for number in group], needs) for group in groups)
+    return Partition(system, plants.parts, demands, needs)
 
 
-def _joined(elements: list[_Element], parts: tuple[frozenset[str], ...]) -> Demand:
+def _needed(place: int, plants: "_Plants", place_of: Mapping[str, int]) -> frozenset[int]:
+    """The parts that a part needs, those that these need, and so on."""
+    found, waiting = {place}, [place]
+    while waiting:
+        for name in plants.parts[waiting.pop()]:
+            for decider in plants.deciders.get(name, ()):
+                if place_of[decider] not in found:
+                    found.add(place_of[decider])
+                    waiting.append(place_of[decider])
+    return frozenset(found)
+
+
+def _joined(elements: list[_Element], needs: Sequence[frozenset[int]]) -> Demand:
     demands = [element.demand for element in elements]
-    places = frozenset(place for element in elements for place in element.parts)
+    places = frozenset(need for element in elements for place in element.parts for need in needs[place])
     return Demand(
         # A demand about no part, such as `marked false`, may be put to any.
-        parts=places if places or not parts else frozenset({0}),
+        parts=places if places or not needs else needs[0],
         automata=frozenset().union(*(item.automata for item in demands)),
         conditions=frozenset().union(*(item.conditions for item in demands)),
         invariants=frozenset().union(*(item.invariants for item in demands)),
@@ -235,7 +262,8 @@ class _Plants:
     Attributes:
         names: Names of all automata.
         parts: The groups.
-        owners: One automaton for each event that any automaton has.
+        owners: One automaton for each event that any automaton has; of those that only hear it the one that decides.
+        deciders: For each automaton those that decide on events that it only hears.
     """
 
     def __init__(self, system: System) -> None:
@@ -256,11 +284,17 @@ class _Plants:
                 self.names.add(name)
                 waiting += _read_by(self._automata[name])
         groups = Groups(item.name for item in system.automata if item.name in self.names)
-        self.owners: dict[str, str] = {}
+        self.owners = self._heard(system)
+        self.deciders: dict[str, set[str]] = {}
+        heard = set(self.owners)
         for name in (item.name for item in system.automata if item.name in self.names):
             groups.join((name, *_read_by(self._automata[name])))
             for event in self._automata[name].alphabet:
-                groups.join((name, self.owners.setdefault(event, name)))
+                decider = self.owners.setdefault(event, name)
+                if event in heard:
+                    self.deciders.setdefault(name, set()).add(decider)
+                else:
+                    groups.join((name, decider))
         for event, names in conditions:
             owner = self.owners.get(event)
             if owner is not None or names:
@@ -269,3 +303,38 @@ class _Plants:
             if names:
                 groups.join(names)
         self.parts = tuple(frozenset(group) for group in groups)
+
+    def _heard(self, system: System) -> dict[str, str]:
+        """For each event that several plants share, and all but one only hear, the one that decides.
+
+        It is uncontrollable, no requirement is about it, and at most one of them reads its data.
+        """
+        if system.plant_invariants:
+            # They could prevent the event by what one of them does.
+            return {}
+        takers: dict[str, list[Automaton]] = defaultdict(list)
+        for automaton in system.automata:
+            for event in automaton.alphabet:
+                takers[event].append(automaton)
+        restricted = {item.event for item in (*system.conditions, *system.plant_conditions)}
+        found: dict[str, str] = {}
+        for event in (item.name for item in system.events if not item.is_controllable):
+            automata = takers[event]
+            if len(automata) < 2 or event in restricted or any(item.role is not Role.PLANT for item in automata):
+                continue
+            deciding = [item for item in automata if not _accepts(item, event)]
+            reading = [item for item in automata if _reads_data(item, event)]
+            if len(deciding) < 2 and len(reading) < 2:
+                # The one that does least else, as the plant of a message.
+                found[event] = min(deciding or automata, key=lambda item: len(item.alphabet)).name
+        return found
+
+
+def _accepts(automaton: Automaton, event: str) -> bool:
+    """Return True if an automaton takes an event in every state."""
+    free = {edge.source for edge in automaton.edges if edge.event == event and edge.guard == TRUE}
+    return event in automaton.monitors or free.issuperset(automaton.locations)
+
+
+def _reads_data(automaton: Automaton, event: str) -> bool:
+    return any(any(map(paths_read, _expressions(edge))) for edge in automaton.edges if edge.event == event)

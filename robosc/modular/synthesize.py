@@ -25,8 +25,9 @@ from robosc.modular.nonconflict import is_nonconflicting
 from robosc.modular.partition import Groups, Module, Partition, partition
 from robosc.supervisor import AddedCondition, DecisionDiagram
 from robosc.supervisor.diagram import diagram_domains
-from robosc.synthesis import SynthesisProgress, SynthesisResult, SynthesisStatus, synthesize
+from robosc.synthesis import Questions, Statistics, SynthesisProgress, SynthesisResult, SynthesisStatus, synthesize
 from robosc.synthesis.engines import EngineOptions
+from robosc.synthesis.result import statistics_of
 
 STATES = 10_000
 """Maximum number of states of a module, and of a composition, for the check whether modules block each other."""
@@ -81,6 +82,16 @@ class ModularResult:
         """The module without a supervisor; None if every module has one."""
         return next((item for item in self.modules if item.result.status is SynthesisStatus.EMPTY), None)
 
+    @property
+    def group_of(self) -> dict[int, int]:
+        """Number of the group of each module, by its place."""
+        return {place: number for number, group in enumerate(self.groups, start=1) for place in group}
+
+    @property
+    def statistics(self) -> Statistics:
+        """Figures: sums or maxima over the modules; as states 0 if they were not counted."""
+        return statistics_of([item.result.statistics for item in self.modules], states=self.states or 0)
+
 
 def synthesize_modular(
     system: System,
@@ -88,6 +99,9 @@ def synthesize_modular(
     engine: str | EngineOptions = "auto",
     limit: int = STATES,
     module_bits: float = MAXIMUM_BITS,
+    questions: Callable[[Partition, Module, System, bool], Questions] = lambda parts, module, system, is_alone: (
+        Questions()
+    ),
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[str], None] = lambda message: None,
 ) -> ModularResult:
@@ -98,6 +112,8 @@ def synthesize_modular(
         engine: Name of the engine for decision diagrams, or its options.
         limit: Maximum number of states of a module, or of a composition, for the check of mutual blocking.
         module_bits: Logarithm of the combinations of values up to which requirements share a module.
+        questions: Questions about the states of a module under its supervisor, by the parts, the module, its synthesis
+            problem, and whether it shares nothing with other modules.
         should_stop: Function called before each step of the work; once it returns true, the work ends.
         on_progress: Function called with the progress of the work, in words.
 
@@ -108,7 +124,8 @@ def synthesize_modular(
         UnsupportedModelError: Synthesis does not support a module, or the combined conditions of several modules.
     """
     parts = partition(system)
-    return _Synthesis(parts, engine, limit, should_stop, on_progress).result(modules_of(parts, module_bits))
+    search = _Synthesis(parts, engine, limit, questions, should_stop, on_progress)
+    return search.result(modules_of(parts, module_bits))
 
 
 class _Synthesis:
@@ -117,35 +134,38 @@ class _Synthesis:
         parts: Partition,
         engine: str | EngineOptions,
         limit: int,
+        questions: Callable[[Partition, Module, System, bool], Questions],
         should_stop: Callable[[], bool],
         on_progress: Callable[[str], None],
     ) -> None:
         self._partition = parts
         self._engine = engine
         self._limit = limit
+        self._questions = questions
         self._should_stop = should_stop
         self._on_progress = on_progress
+        self._systems: dict[Module, System] = {}
         self._made: dict[Module, ModuleSupervisor] = {}
         self._controlled: dict[Module, ControlledModule | None] = {}
         # Modules of which it is known that they do not block each other.
         self._fine: set[frozenset[Module]] = set()
-        self._part_of = {
-            event: place
-            for place, names in enumerate(parts.parts)
-            for item in parts.system.automata
-            if item.name in names
-            for event in item.alphabet
-        }
+        self._parts_of: dict[str, set[int]] = {}
+        place_of = {name: place for place, names in enumerate(parts.parts) for name in names}
+        for item in parts.system.automata:
+            for event in item.alphabet if item.name in place_of else ():
+                self._parts_of.setdefault(event, set()).add(place_of[item.name])
 
     def result(self, first: Sequence[Module]) -> ModularResult:
         """The supervisors of all modules, or the first module without one, from given initial modules."""
         modules = list(first)
         while True:
+            groups = self._groups(modules)
+            alone = {group[0] for group in groups if len(group) == 1}
             for number, module in enumerate(modules):
-                made = self._supervisor(module, f"module {number + 1} of {len(modules)}")
+                what = f"module {number + 1} of {len(modules)}"
+                made = self._supervisor(module, what, is_alone=number in alone)
                 if made.result.status is SynthesisStatus.EMPTY:
                     return ModularResult(self._partition, (made,))
-            groups = self._groups(modules)
             merged: Sequence[Sequence[Module]] = ()
             for group in groups:
                 members = [modules[place] for place in group]
@@ -163,14 +183,26 @@ class _Synthesis:
                 inside = [item for item in modules if item.parts <= whole.parts]
                 modules = [*(item for item in modules if item not in inside), reduce(or_, inside, whole)]
 
-    def _supervisor(self, module: Module, what: str) -> ModuleSupervisor:
+    def _system(self, module: Module) -> System:
+        if module not in self._systems:
+            self._systems[module] = self._partition.system_of(module)
+        return self._systems[module]
+
+    def _supervisor(self, module: Module, what: str, *, is_alone: bool) -> ModuleSupervisor:
+        # Modules that share something never come to share nothing, unless they become another module.
         if module not in self._made:
-            system = self._partition.system_of(module)
+            system = self._system(module)
 
             def report(progress: SynthesisProgress) -> None:
                 self._on_progress(f"{what}: {progress}")
 
-            found = synthesize(system, engine=self._engine, should_stop=self._should_stop, on_progress=report)
+            found = synthesize(
+                system,
+                engine=self._engine,
+                questions=self._questions(self._partition, module, system, is_alone),
+                should_stop=self._should_stop,
+                on_progress=report,
+            )
             self._made[module] = ModuleSupervisor(module, system, found)
         return self._made[module]
 
@@ -179,7 +211,7 @@ class _Synthesis:
         groups = Groups(range(len(modules)))
         first: dict[object, int] = {}
         for place, module in enumerate(modules):
-            for thing in (*module.parts, *(event.name for event in self._made[module].system.events)):
+            for thing in (*module.parts, *(event.name for event in self._system(module).events)):
                 groups.join((first.setdefault(thing, place), place))
         return [tuple(group) for group in groups]
 
@@ -195,7 +227,7 @@ class _Synthesis:
         if len(known) < len(controlled):
             return None
         try:
-            graphs = graphs_of(known, self._part_of)
+            graphs = graphs_of(known, self._parts_of)
             return is_nonconflicting(graphs, limit=self._limit, should_stop=self._should_stop)
         except TooLargeError:
             return None
@@ -219,7 +251,7 @@ class _Synthesis:
         pairs: list[tuple[Module, Module]] = []
         users: dict[object, list[Module]] = {}
         for module in modules:
-            things = (*module.parts, *(event.name for event in self._made[module].system.events))
+            things = (*module.parts, *(event.name for event in self._system(module).events))
             others = dict.fromkeys(other for thing in things for other in users.get(thing, ()))
             pairs += [(other, module) for other in others]
             for thing in things:

@@ -1,10 +1,11 @@
 """Automata as models: loaded from a file (CIF, libFAUDES, Supremica), checked, synthesized and verified."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from robosc.automata import CheckedSystem, System
-from robosc.errors import InvalidSupervisorError
+from robosc.automata import CheckedSystem, System, SystemPlaces, as_controlled
+from robosc.errors import Diagnostic, InvalidSupervisorError, Severity, sorted_diagnostics
 from robosc.expressions import conjunction
 from robosc.json_documents import diagnostics_json
 from robosc.pipeline.automata_files import check_automata_file
@@ -52,8 +53,11 @@ def automata_synthesis(
     *,
     is_modular: bool = False,
     initial: str | None = None,
+    as_is: bool = False,
 ) -> SystemSynthesis:
     """Synthesize the supervisor of automata; parameters and errors as of `robosc.synthesize`.
+
+    With `as_is`, nothing is added: the requirements are taken for a supervisor that was made already.
 
     Raises:
         ValueError: An option is for models of robots alone.
@@ -67,8 +71,26 @@ def automata_synthesis(
         return SystemSynthesis(SynthesisStatus.MODEL_ERRORS, "", None, None, diagnostics, explanation)
     if initial is not None:
         system = begun(system, initial)
+    if as_is:
+        system = as_controlled(system)
     made = synthesize_system(system, options, on_progress, should_stop, found.places, is_modular=is_modular)
+    if made.supervisor is not None and not isinstance(model, System):
+        forbidden = _forbidden(made.supervisor, found.places)
+        diagnostics = Findings(sorted_diagnostics([*diagnostics, *forbidden]), model)
     return replace(made, diagnostics=diagnostics)
+
+
+def _forbidden(supervisor: SystemSupervisor, places: SystemPlaces) -> Iterator[Diagnostic]:
+    """Yield warnings of events that the supervisor always forbids."""
+    for item in supervisor.added:
+        if not item.condition.root:
+            yield Diagnostic(
+                Severity.WARNING,
+                "never-enabled",
+                f"'{item.event}' can never happen: the supervisor forbids it wherever plants and requirements allow it",
+                places.events.get(item.event),
+                f"Run 'robosc explain-synthesis --event {item.event}' to see why.",
+            )
 
 
 def automata_verification(
@@ -80,11 +102,15 @@ def automata_verification(
     *,
     is_strict: bool,
     controller: bool = False,
+    as_is: bool = False,
 ) -> Verification:
-    """Synthesize the supervisor of automata, and verify it independently, with `controller` its properties, too."""
+    """Synthesize the supervisor of automata, and verify it independently, with `controller` its properties, too.
+
+    With `as_is`, nothing is synthesized: the automata are verified as they stand.
+    """
     from robosc.explanation import EmptyExplanation, document
 
-    made = automata_synthesis(model, options, on_progress, should_stop)
+    made = automata_synthesis(model, options, on_progress, should_stop, as_is=as_is)
     if made.status is SynthesisStatus.UNSUPPORTED_MODEL:
         return Verification(VerificationStatus.UNSUPPORTED_MODEL, made.diagnostics, made.reason, {})
     findings = diagnostics_json(made.diagnostics)

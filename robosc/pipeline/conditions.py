@@ -9,6 +9,7 @@ from robosc.conditions.rendering import Line, diagram_lines
 from robosc.conditions.summary import ELSEWHERE, FROM_THE_FIRST, added_formulas, condition_line, short_diagrams
 from robosc.errors import UnknownNameError
 from robosc.expressions import TRUE, Expression
+from robosc.expressions.text import cif_text
 from robosc.model.findings import did_you_mean
 from robosc.supervisor import AddedCondition, DecisionDiagram
 from robosc.supervisor.diagram import diagram_domains
@@ -105,26 +106,39 @@ def unknown_event(event: object, known: Sequence[str] | Mapping[str, object], wh
     return f"there is no {what} {str(event)!r:.100}; {hint}"
 
 
-def conditions_of(added: Sequence[AddedCondition], system: System, components: frozenset[str]) -> Conditions:
+def conditions_of(
+    added: Sequence[AddedCondition],
+    system: System,
+    components: frozenset[str],
+    *,
+    is_cif: bool = False,
+) -> Conditions:
     """Return the conditions that a supervisor adds to each controllable event.
 
     Args:
         added: Conditions that the supervisor adds.
         system: Automata that it supervises.
         components: Names of the automata that go by their own names in conditions.
+        is_cif: True if texts are in CIF's notation.
     """
     found = added_formulas(added, system)
-    vocabulary = Vocabulary(diagram_domains(system), components)
+    vocabulary = Vocabulary(diagram_domains(system), components, is_cif=is_cif)
     return Conditions(
         [
-            Condition(event, condition_line(diagram, formula, components), formula, diagram, vocabulary)
+            Condition(event, _line(diagram, formula, components, is_cif=is_cif), formula, diagram, vocabulary)
             for event, diagram, formula in found
         ]
     )
 
 
 def condition_of(
-    event: str, diagram: DecisionDiagram, formula: Expression | None, system: System, components: frozenset[str]
+    event: str,
+    diagram: DecisionDiagram,
+    formula: Expression | None,
+    system: System,
+    components: frozenset[str],
+    *,
+    is_cif: bool = False,
 ) -> Condition:
     """Return a condition in words.
 
@@ -134,6 +148,13 @@ def condition_of(
         formula: The same as an expression, or None where none reads well.
         system: Automata that it is about.
         components: Names of the automata that go by their own names in conditions.
+        is_cif: True if texts are in CIF's notation.
     """
-    vocabulary = Vocabulary(diagram_domains(system), components)
-    return Condition(event, condition_line(diagram, formula, components), formula, diagram, vocabulary)
+    vocabulary = Vocabulary(diagram_domains(system), components, is_cif=is_cif)
+    return Condition(event, _line(diagram, formula, components, is_cif=is_cif), formula, diagram, vocabulary)
+
+
+def _line(diagram: DecisionDiagram, formula: Expression | None, components: frozenset[str], *, is_cif: bool) -> str:
+    if formula is None or not is_cif:
+        return condition_line(diagram, formula, components)
+    return cif_text(formula)

@@ -3,6 +3,8 @@
 from dataclasses import dataclass, replace
 from typing import overload
 
+from msgspec.structs import replace as replace_struct
+
 from robosc.automata import System, check_system
 from robosc.certification import OutcomeStatus, Progress, SynthesisOutcome, SynthesisProblem, make_supervisor, prepare
 from robosc.certification.goals import GoalExplanation
@@ -14,8 +16,10 @@ from robosc.explanation import (
     Explanation,
     ModelWords,
     SystemWords,
+    explain_empty,
     explain_synthesis,
 )
+from robosc.explanation.parts import EventReport, Remark
 from robosc.model.structure import Deployment
 from robosc.pipeline.automata_models import checked_automata
 from robosc.pipeline.findings import Findings
@@ -44,6 +48,7 @@ def explain(
     event: str | None = None,
     state: str | None = None,
     after: str | None = None,
+    is_modular: bool = False,
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> Explained: ...
@@ -57,6 +62,7 @@ def explain(
     event: str | None = None,
     state: str | None = None,
     after: str | None = None,
+    is_modular: bool = False,
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> Explained | Page:
@@ -72,11 +78,14 @@ def explain(
         event: The event to explain; None: all events, and warnings.
         state: Description of a state in which to explain what can happen, such as `Door.closed, Lift.n = 2`.
         after: Run after which to explain what can happen, such as `open, jam.response`.
+        is_modular: True if a robot is explained module by module: each event in every module that has it, by runs of
+            that module alone.
         on_progress: Function called with the progress of the work.
         should_stop: Function called before each step; once it returns true, the work ends.
 
     Raises:
-        TypeError: Neither a model nor a code is given, or both are.
+        TypeError: Neither a model nor a code is given, or both are; or a state, a run or automata are to be explained
+            in modules.
         UnknownCodeError: There is no such code.
         RequestError: The event, the part of the model, the state or the run does not exist.
         FileAccessError: The file does not exist or cannot be read.
@@ -92,11 +101,15 @@ def explain(
         return page(model.code)
     if model is None:
         return page(str(code))
-    asked = ExplanationSubject(event, state, after)
-    if isinstance(model, System):
-        check_system(model)
-        return explained_system(SystemWords(model), options.engine_options(), asked, on_progress, should_stop)
-    bundle = loaded(model)
+    asked = ExplanationSubject(event, state, after, is_modular)
+    if is_modular and (state is not None or after is not None):
+        raise TypeError("is_modular explains events: a state, or what follows a run, is of the whole robot")
+    bundle = model if isinstance(model, System) else loaded(model)
+    if is_modular and isinstance(bundle, System | LoadedAutomata):
+        raise TypeError("is_modular explains robots: of automata the whole is explained")
+    if isinstance(bundle, System):
+        check_system(bundle)
+        return explained_system(SystemWords(bundle), options.engine_options(), asked, on_progress, should_stop)
     if isinstance(bundle, LoadedAutomata):
         return _explained_automata(bundle, options, asked, on_progress, should_stop)
     try:
@@ -132,11 +145,13 @@ class ExplanationSubject:
         event: The event to explain.
         state: Description of a state in which to explain what can happen.
         after: Run after which to explain what can happen.
+        is_modular: True if events are explained module by module.
     """
 
     event: str | None = None
     state: str | None = None
     after: str | None = None
+    is_modular: bool = False
 
 
 def explained(
@@ -156,7 +171,7 @@ def explained(
     if isinstance(problem, SynthesisOutcome):
         return problem
     has_goals = deployment is Deployment.CONTROLLER and goals_and_missions(problem.model)
-    if has_goals and asked == ExplanationSubject():
+    if has_goals and (asked.event, asked.state, asked.after) == (None, None, None):
         made = make_supervisor(
             bundle,
             deployment=deployment,
@@ -164,6 +179,7 @@ def explained(
             verify_limit=0,
             allow_livelock=True,
             only_shown=True,
+            is_modular=asked.is_modular,
             should_stop=should_stop,
             on_progress=on_progress,
         )
@@ -172,7 +188,8 @@ def explained(
         if isinstance(made.explanation, EmptyExplanation):
             return problem, Explanation(made.explanation)
     words = ModelWords(problem.model, problem.places, problem.system.automata, deployment)
-    return problem, _explanation(words, engine, asked, on_progress, should_stop)
+    explain_ = _in_modules if asked.is_modular else _explanation
+    return problem, explain_(words, engine, asked, on_progress, should_stop)
 
 
 def explained_system(
@@ -223,3 +240,48 @@ def _explanation(
         should_stop=should_stop,
         on_progress=lambda step: on_progress(Progress("synthesis", str(step))),
     )
+
+
+def _in_modules(
+    words: ModelWords,
+    engine: EngineOptions,
+    asked: ExplanationSubject,
+    on_progress: OnProgress,
+    should_stop: ShouldStop,
+) -> Explanation:
+    """Return the explanation of a robot, module by module.
+
+    Raises:
+        RequestError: There is no such event.
+    """
+    from robosc.modular.robots import synthesize_robot
+
+    event = None if asked.event is None else words.requests.event(asked.event)
+
+    def report(step: object) -> None:
+        on_progress(Progress("synthesis", str(step)))
+
+    found = synthesize_robot(
+        words.model,
+        words.places,
+        words.system,
+        words.deployment,
+        engine=engine,
+        should_stop=should_stop,
+        on_progress=report,
+    )
+    modules = [(part, ModelWords(part.model, part.places, part.system, words.deployment)) for part in found.parts]
+    if found.modular.unsolved is not None:
+        ((_, mine),) = modules
+        empty = explain_empty(mine, engine=engine, should_stop=should_stop, on_progress=report)
+        return Explanation(empty=empty)
+    events: list[EventReport] = []
+    remarks: dict[str, Remark] = {item.message: item for item in words.remarks(found.result.answers)}
+    for part, mine in modules:
+        if event is not None and event not in {item.name for item in part.system.events}:
+            continue
+        made = explain_synthesis(mine, engine=engine, event=event, should_stop=should_stop, on_progress=report)
+        events += [replace_struct(item, module=part.components) for item in made.events]
+        # The robot does not reach what a module never reaches.
+        remarks |= {item.message: item for item in made.remarks if item.kind == "unreachable-state"}
+    return Explanation(events=tuple(events), remarks=() if event is not None else tuple(remarks.values()))

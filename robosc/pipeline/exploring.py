@@ -141,7 +141,7 @@ def _explored(
     should_stop: ShouldStop,
 ) -> Exploration:
     states = supervisor.states if isinstance(supervisor, SystemSupervisor) else supervisor.certificate.states
-    on_progress(Progress("exploration", f"{states} states"))
+    on_progress(Progress("exploration", "states not counted" if states in (0, "0") else f"{states} states"))
     try:
         graph = graph_of(supervisor, limit=limit, should_stop=should_stop)
     except UnsupportedModelError as error:

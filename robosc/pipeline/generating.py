@@ -32,6 +32,7 @@ def generate(
     options: SynthesisOptions = DEFAULT_OPTIONS,
     *,
     initial: str | None = None,
+    is_modular: bool = False,
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> Generation:
@@ -47,6 +48,7 @@ def generate(
         generation: Choices about the files.
         options: Options for making the supervisor of a model.
         initial: Description of the initial state of automata that have several, such as `tank.level = 1`.
+        is_modular: True for a synthesis in modules, as of `synthesize`.
         on_progress: Function called with the progress of the work.
         should_stop: Function called again and again; once it returns true, the work ends.
 
@@ -76,14 +78,16 @@ def generate(
         return _of_automata(model, Findings(), target, generation, on_progress)
     bundle = model if isinstance(model, System) else loaded(model)
     if isinstance(bundle, System | LoadedAutomata):
-        made = automata_synthesis(bundle, options, on_progress, should_stop, initial=initial)
+        made = automata_synthesis(bundle, options, on_progress, should_stop, is_modular=is_modular, initial=initial)
         if made.supervisor is None:
             explanation = made.explanation if isinstance(made.explanation, EmptyExplanation) else None
             return Generation(made.status, made.diagnostics, made.reason, None, explanation, target)
         return _of_automata(made.supervisor, made.diagnostics, target, generation, on_progress)
     if initial is not None:
         raise TypeError("initial= chooses where automata begin: a robot begins in one state")
-    attempt = make(bundle, options, on_progress, should_stop, allow_livelock=options.allow_livelock)
+    attempt = make(
+        bundle, options, on_progress, should_stop, allow_livelock=options.allow_livelock, is_modular=is_modular
+    )
     if isinstance(attempt, Unsupported):
         status, reason = status_of(attempt)
         return Generation(status, findings_of(attempt, bundle), reason, None, target=target)

@@ -1,6 +1,6 @@
 """Data of events: checked when a person gives it, drawn at random, and described for a form."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from random import Random
 from typing import Any
@@ -31,6 +31,8 @@ from robosc.expressions import (
 from robosc.model.findings import did_you_mean
 from robosc.model.received import converted_paths, required_parts
 from robosc.model.structure import EventKind, Model, is_tau
+
+_BOOLEANS = ("false", "true")
 
 MAXIMUM_ELEMENTS = 1000
 """Number of elements of a random array: elements beyond it are unknown."""
@@ -90,7 +92,7 @@ class DataField:
             "path": list(self.path),
             "type": self.type,
             "choices": list(self.choices),
-            "is_boolean": self.type == "boolean",
+            "is_boolean": self.choices == _BOOLEANS,
             "is_required": self.is_required,
         }
 
@@ -117,16 +119,23 @@ def _parts(model: Model, type_: Type, path: tuple[str, ...]) -> Iterator[tuple[t
             yield path, type_
 
 
-def data_field(path: tuple[str, ...], type_: Type, *, is_read: bool, is_required: bool) -> DataField:
-    """Return the part of a datum at a path, whose type has no parts itself."""
+def data_field(
+    path: tuple[str, ...],
+    type_: Type,
+    *,
+    is_read: bool,
+    is_required: bool,
+    text: Callable[[Type], str] = type_text,
+) -> DataField:
+    """Return the part of a datum at a path, whose type has no parts itself; `text` writes the type."""
     match type_:
         case EnumType(values=names):
             choices = tuple(names)
         case BooleanType():
-            choices = ("false", "true")
+            choices = _BOOLEANS
         case _:
             choices = ()
-    return DataField(path, type_text(type_), choices, isinstance(type_, IntegerType | DoubleType), is_read, is_required)
+    return DataField(path, text(type_), choices, isinstance(type_, IntegerType | DoubleType), is_read, is_required)
 
 
 def one_datum(event: str, data: object, fields: Mapping[str, object]) -> object:

@@ -58,7 +58,9 @@ class SteppedRun(Protocol):
 
 
 def event_text(step: Step) -> str:
-    """An event with the data that came with it: `level.response (value = 3)`."""
+    """An event with the data that came with it: `level.response (value = 3)`, of an input variable `level (3)`."""
+    if step.event in step.state.parts and list(step.data) == ["value"]:
+        return f"{step.event} ({_value_text(step.data['value'])})"
     data = ", ".join(f"{name} = {_value_text(value)}" for name, value in step.data.items())
     return f"{step.event} ({data})" if data else step.event
 

@@ -13,7 +13,7 @@ from robosc.pipeline.files import FileName, SupervisorFile, given_path, read_bou
 from robosc.pipeline.findings import Findings
 from robosc.pipeline.goals import Goals, goal_summary, goals_of
 from robosc.pipeline.results import Summary
-from robosc.supervisor import AddedCondition, Certificate, Strategy
+from robosc.supervisor import AddedCondition, Certificate, Strategy, SupervisedModule
 from robosc.supervisor import Supervisor as CoreSupervisor
 from robosc.supervisor.codec import MAXIMUM_BYTES, decode, encode
 from robosc.tables import html_table
@@ -28,12 +28,15 @@ class Supervisor(CoreSupervisor, SupervisorFile, frozen=True, dict=True):
         added: Decision diagrams that synthesis adds to events; `conditions` has them in words.
         certificate: Record of what was checked.
         strategy: Decision diagrams of what it chooses to reach the model's goals, or None; `goals` has them in words.
+        modules: The modules of a modular synthesis; else none.
     """
 
     @classmethod
     def of(cls, supervisor: CoreSupervisor, diagnostics: tuple[Diagnostic, ...] | None = None) -> Self:
         """Take a supervisor of the core, with the findings about its model, or None if they are not known."""
-        made = cls.supervising(supervisor.executable, supervisor.added, supervisor.certificate, supervisor.strategy)
+        made = cls.supervising(
+            supervisor.executable, supervisor.added, supervisor.certificate, supervisor.strategy, supervisor.modules
+        )
         # No field: a supervisor's file does not hold them.
         made.__dict__["diagnostics"] = None if diagnostics is None else Findings(diagnostics)
         return made
@@ -75,7 +78,7 @@ class Supervisor(CoreSupervisor, SupervisorFile, frozen=True, dict=True):
 
     @property
     def states(self) -> int:
-        """Reachable states of the controlled system, as the certificate says."""
+        """Reachable states of the controlled system, as the certificate says; 0 if nobody counted those of modules."""
         return int(self.certificate.states)
 
     @property
@@ -113,13 +116,15 @@ class Supervisor(CoreSupervisor, SupervisorFile, frozen=True, dict=True):
         return shown + self.goals._repr_html_() if self.goals else shown
 
     def __reduce__(self) -> tuple[Any, ...]:
-        fields = (self.model, self.deployment, self.added, self.certificate, self.strategy)
+        fields = (self.model, self.deployment, self.added, self.certificate, self.strategy, self.modules)
         return _restored, (type(self), fields, None if self.diagnostics is None else tuple(self.diagnostics))
 
 
 def _restored(
     kind: type[Supervisor],
-    fields: tuple[Model, Deployment, tuple[AddedCondition, ...], Certificate, Strategy | None],
+    fields: tuple[
+        Model, Deployment, tuple[AddedCondition, ...], Certificate, Strategy | None, tuple[SupervisedModule, ...]
+    ],
     diagnostics: tuple[Diagnostic, ...] | None,
 ) -> Supervisor:
     return kind.of(CoreSupervisor(*fields), diagnostics)

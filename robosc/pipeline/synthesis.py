@@ -1,7 +1,7 @@
 """Synthesis of supervisors for models and for automata."""
 
 from dataclasses import dataclass
-from typing import Literal, overload
+from typing import overload
 
 from robosc.automata import System
 from robosc.certification import SynthesisOutcome, make_supervisor
@@ -63,23 +63,12 @@ def synthesize(  # type: ignore[overload-overlap]
 ) -> SystemSynthesis: ...
 
 
-# A type checker cannot know from a file's name what is in it. Modules are made of automata only.
 @overload
 def synthesize(
     model: ModelLike,
     options: SynthesisOptions = DEFAULT_OPTIONS,
     *,
-    is_modular: Literal[True],
-    on_progress: OnProgress = ignored,
-    should_stop: ShouldStop = never,
-) -> SystemSynthesis: ...
-
-
-@overload
-def synthesize(
-    model: ModelLike,
-    options: SynthesisOptions = DEFAULT_OPTIONS,
-    *,
+    is_modular: bool = False,
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> Synthesis: ...
@@ -98,13 +87,12 @@ def synthesize(
     Args:
         model: The model, as `load` returns it, the path of its file, or a `robosc.automata.System`.
         options: Options for making the supervisor; for automata only those about the engine.
-        is_modular: True if automata are synthesized in modules: for systems of many parts whose states do not fit into
-            one diagram.
+        is_modular: True for a synthesis in modules: for robots and systems of many parts, of which each requirement is
+            about few.
         on_progress: Function called with the progress of the work.
         should_stop: Function called again and again; once it returns true, the work ends.
 
     Raises:
-        TypeError: `is_modular` is given for a model of a robot.
         ValueError: An option is for models of robots, and the file holds automata.
         FileAccessError: The file does not exist or cannot be read.
         LanguageError: A file is too large or not UTF-8.
@@ -116,9 +104,9 @@ def synthesize(
     bundle = model if isinstance(model, System) else loaded(model)
     if isinstance(bundle, System | LoadedAutomata):
         return automata_synthesis(bundle, options, on_progress, should_stop, is_modular=is_modular)
-    if is_modular:
-        raise TypeError("is_modular is for automata: a model of a robot is synthesized as a whole")
-    attempt = make(bundle, options, on_progress, should_stop, allow_livelock=options.allow_livelock)
+    attempt = make(
+        bundle, options, on_progress, should_stop, allow_livelock=options.allow_livelock, is_modular=is_modular
+    )
     return _result(attempt, bundle)
 
 
@@ -146,6 +134,7 @@ def make(
     *,
     allow_livelock: bool,
     only_shown: bool = False,
+    is_modular: bool = False,
 ) -> Attempt:
     """Make a supervisor with some options."""
     states = options.verified_states
@@ -157,6 +146,7 @@ def make(
             verify_limit=DEFAULT_STATES if states is None else states,
             allow_livelock=allow_livelock,
             only_shown=only_shown,
+            is_modular=is_modular,
             should_stop=should_stop,
             on_progress=on_progress,
         )

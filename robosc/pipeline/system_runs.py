@@ -13,14 +13,14 @@ from robosc.automata import InputVariable, Semantics, System, composed
 from robosc.automata.compile import Path, State
 from robosc.automata.inputs import valuations
 from robosc.automata.semantics import TooManyChoicesError
-from robosc.automata.state import subject_domain, subjects
+from robosc.automata.state import subject_domain, subject_type, subjects
 from robosc.certification.supervisor_file import StateInWords, state_in_words
 from robosc.errors import RoboscError, UnknownNameError, UnsupportedModelError
 from robosc.explanation.disabled import Disabled
 from robosc.explanation.notation import value_text
-from robosc.expressions import EnumType, Received, Type, Value, type_text
+from robosc.expressions import EnumType, Received, Type, Value
 from robosc.expressions.inference import has_type
-from robosc.expressions.text import expression_text
+from robosc.expressions.text import cif_type_text, expression_text, literal_named
 from robosc.model.findings import did_you_mean
 from robosc.pipeline.conditions import unknown_event
 from robosc.pipeline.manual_run import ManualRun
@@ -65,7 +65,11 @@ def state_parts(system: System, text: str) -> dict[str, Value]:
         name, _, value = (item.strip() for item in part.partition("="))
         if name not in known:
             raise UnknownNameError(unknown_event(name, known, "part of the state"))
-        values = {value_text(item): item for item in subject_domain(system, known[name])}
+        subject = known[name]
+        values = {value_text(item): item for item in subject_domain(system, subject)}
+        type_ = None if subject.variable is None else subject_type(system, subject)
+        if isinstance(type_, EnumType):
+            value = literal_named(type_, value)
         if value not in values:
             shown = ", ".join([*list(values)[:_MAXIMUM_VALUES], *(["..."] if len(values) > _MAXIMUM_VALUES else [])])
             raise ChoiceError(f"{name} is never {value!r:.100}: it is one of {shown}")
@@ -139,7 +143,8 @@ class SystemRun(ManualRun):
         """
         inputs = self._inputs.get(self._require_event(event), ())
         return tuple(
-            data_field(tuple(map(str, item.path)), item.type, is_read=True, is_required=False) for item in inputs
+            data_field(tuple(map(str, item.path)), item.type, is_read=True, is_required=False, text=cif_type_text)
+            for item in inputs
         )
 
     def choices(self, event: str, data: object = NO_DATA, /) -> tuple[StateInWords, ...]:
@@ -280,6 +285,8 @@ def _read(
     place = f"{expression_text(Received(path))} of '{event}'"
     if path in inputs:
         type_ = inputs[path].type
+        if isinstance(type_, EnumType) and isinstance(data, str):
+            data = literal_named(type_, data)
         if data is None and inputs[path].may_be_unknown:
             found[path] = None
         elif data is None or not has_type(data, type_):
@@ -310,7 +317,7 @@ def _read(
 
 
 def _type_words(type_: Type) -> str:
-    return f"one of {', '.join(type_.values)}" if isinstance(type_, EnumType) else type_text(type_)
+    return f"one of {', '.join(type_.values)}" if isinstance(type_, EnumType) else cif_type_text(type_)
 
 
 def _varying(states: Sequence[State]) -> list[int]:

@@ -15,6 +15,7 @@ from robosc.automata.state import subjects, whole_names
 from robosc.certification import Progress
 from robosc.conditions.rendering import Formulas
 from robosc.errors import InvalidSupervisorError, InvalidSystemError, NodeLimitError, UnsupportedModelError
+from robosc.expressions.text import cif_text
 from robosc.pipeline.conditions import Condition, Conditions, condition_of, conditions_of
 from robosc.pipeline.files import FileName, SupervisorFile, given_path, read_bounded
 from robosc.pipeline.findings import Findings
@@ -29,7 +30,6 @@ from robosc.supervisor.structure import FORMAT, FORMAT_VERSION
 from robosc.supervisor.validation import validate_added, validate_condition
 from robosc.synthesis import EngineOptions, Statistics, SynthesisProgress, synthesize
 from robosc.synthesis import SynthesisStatus as CoreStatus
-from robosc.synthesis.result import statistics_of
 from robosc.tables import html_table
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class SystemSupervisor(SupervisorFile):
     @cached_property
     def conditions(self) -> Conditions:
         """Conditions that it adds to each controllable event, in words."""
-        return conditions_of(self.added, self.system, whole_names(self.system))
+        return conditions_of(self.added, self.system, whole_names(self.system), is_cif=True)
 
     @property
     def initial_condition(self) -> Condition | None:
@@ -94,7 +94,7 @@ class SystemSupervisor(SupervisorFile):
         if self.initial is None:
             return None
         formula = Formulas(diagram_domains(self.system)).formula(self.initial)
-        return condition_of(INITIALLY, self.initial, formula, self.system, whole_names(self.system))
+        return condition_of(INITIALLY, self.initial, formula, self.system, whole_names(self.system), is_cif=True)
 
     def may_begin(self, state: State) -> bool:
         """Return True if it allows an initial state, given by its values in the order of `subjects`."""
@@ -293,9 +293,7 @@ def _synthesized_in_modules(
         reason = f"no supervisor exists: {names}: {found.unsolved.result.reason}"
         words = SystemWords(*found.partition.problem_of(found.unsolved.module, places))
         return _empty(words, reason, found.unsolved.result.statistics, engine, on_progress, should_stop)
-    figures = [item.result.statistics for item in found.modules]
-    statistics = statistics_of(figures, states=found.states or 0)
-    group_of = {place: number for number, group in enumerate(found.groups, start=1) for place in group}
+    statistics, group_of = found.statistics, found.group_of
     modules = tuple(
         SupervisedModule(item.automata, item.result.statistics.states, group_of[place])
         for place, item in enumerate(found.modules)
@@ -487,6 +485,7 @@ def _verified(
         initial=None if supervisor.initial is None else state_predicate(system, supervisor.initial),
         expected_states=supervisor.states,
         engine=options.engine_options().name,
+        text=cif_text,
         should_stop=should_stop,
         on_progress=report,
     )

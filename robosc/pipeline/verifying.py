@@ -65,6 +65,7 @@ def verify(
     maximum_states: int | None = None,
     is_strict: bool = False,
     controller: bool = False,
+    as_is: bool = False,
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> Verification: ...
@@ -80,6 +81,7 @@ def verify(
     maximum_states: int | None = None,
     is_strict: bool = False,
     controller: bool = False,
+    as_is: bool = False,
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> Verification:
@@ -99,6 +101,8 @@ def verify(
         is_strict: True if a given supervisor passes only if permissiveness was checked, too.
         controller: True if automata, or their supervisor, are also checked for bounded and finite response, confluence
             and nonblocking under control.
+        as_is: True if nothing is synthesized for automata: they are checked as they stand, with requirements for their
+            supervisor.
         on_progress: Function called with the progress of the work.
         should_stop: Function called again and again; once it returns true, the work ends.
 
@@ -119,8 +123,10 @@ def verify(
         raise ValueError(f"maximum_states is {states}, and must not be negative")
     limits = Limits.of(states)
     if isinstance(model, SystemSupervisor):
-        if claims or supervisor is not None:
-            raise TypeError("a supervisor of automata is verified by itself: properties and supervisor= need a model")
+        if claims or supervisor is not None or as_is:
+            raise TypeError(
+                "a supervisor of automata is verified by itself: properties, supervisor= and as_is= need a model"
+            )
         return verify_system(
             model, chosen, limits, on_progress, should_stop, is_strict=is_strict, controller=controller
         )
@@ -130,10 +136,13 @@ def verify(
             if claims or supervisor is not None:
                 raise TypeError("automata are verified by themselves: properties and supervisor= need a robot's model")
             return automata_verification(
-                bundle, chosen, limits, on_progress, should_stop, is_strict=is_strict, controller=controller
-            )
+                bundle, chosen, limits, on_progress, should_stop, is_strict=is_strict, controller=controller,
+                as_is=as_is,
+            )  # fmt: skip
         if controller:
             raise TypeError("controller= is for automata: synthesize checks the controller of a robot")
+        if as_is:
+            raise TypeError("as_is= is for automata: a robot has a supervisor only if one is synthesized")
         if supervisor is not None:
             if bundle is None:
                 raise TypeError("supervisor= is checked against a model: give the model as the first argument")

@@ -11,7 +11,9 @@ from robosc.supervisor.structure import (
     DecisionNode,
     PropertyResult,
     Strategy,
+    SupervisedModule,
     Supervisor,
+    certified_states,
 )
 
 __all__ = [
@@ -24,7 +26,9 @@ __all__ = [
     "DecisionNode",
     "PropertyResult",
     "Strategy",
+    "SupervisedModule",
     "Supervisor",
+    "certified_states",
     "decode",
     "encode",
 ]

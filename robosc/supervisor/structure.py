@@ -123,7 +123,8 @@ class Certificate(msgspec.Struct, frozen=True, omit_defaults=True):
         controllable: No uncontrollable event that the plant enables is disabled.
         nonblocking: From every reachable state a marked state stays reachable.
         maximally_permissive: Nothing more is disabled than needed.
-        states: Reachable states of the controlled system, exact.
+        states: Reachable states of the controlled system, exact; 0 where modules that share something were not
+            counted together.
         transitions: Transitions between them, or None where they were not counted.
         controller: Properties of the controller, or None if they were not checked.
         goals: Under the strategy every goal comes true, and every mission goes on, while the assumptions come true;
@@ -144,6 +145,30 @@ class Certificate(msgspec.Struct, frozen=True, omit_defaults=True):
     goals: CheckResult | None = None
 
 
+def certified_states(certificate: Certificate) -> str:
+    """The states that a certificate states, in words."""
+    return "states not counted" if certificate.states == "0" else f"{certificate.states} states"
+
+
+class SupervisedModule(msgspec.Struct, frozen=True):
+    """A module of a modular synthesis: it is safe, controllable and nonblocking by itself.
+
+    Attributes:
+        automata: Names of its automata.
+        requirements: Numbers of the requirements on events that are in it, wholly or partly.
+        invariants: Numbers of the requirements that must always (or never) hold.
+        states: Reachable states under its own supervisor.
+        group: Number of its group: modules of different groups share nothing, and modules of one group do not block
+            each other.
+    """
+
+    automata: tuple[PartName, ...]
+    requirements: tuple[Count, ...]
+    invariants: tuple[Count, ...]
+    states: str
+    group: Annotated[int, msgspec.Meta(ge=1)]
+
+
 class Supervisor(msgspec.Struct, frozen=True, dict=True, omit_defaults=True):
     """A synthesized supervisor.
 
@@ -153,6 +178,7 @@ class Supervisor(msgspec.Struct, frozen=True, dict=True, omit_defaults=True):
         added: The conditions that synthesis adds, in source order of their events.
         certificate: Record of what was checked.
         strategy: Strategy that reaches the model's goals and visits; None where it has none, and in a layer.
+        modules: The modules of a modular synthesis; else none.
     """
 
     model: Model
@@ -160,6 +186,7 @@ class Supervisor(msgspec.Struct, frozen=True, dict=True, omit_defaults=True):
     added: tuple[AddedCondition, ...]
     certificate: Certificate
     strategy: Strategy | None = None
+    modules: tuple[SupervisedModule, ...] = ()
 
     @classmethod
     def supervising(
@@ -168,9 +195,10 @@ class Supervisor(msgspec.Struct, frozen=True, dict=True, omit_defaults=True):
         added: tuple[AddedCondition, ...],
         certificate: Certificate,
         strategy: Strategy | None = None,
+        modules: tuple[SupervisedModule, ...] = (),
     ) -> Self:
         """The supervisor of a system that is built already."""
-        made = cls(system.model, system.deployment, added, certificate, strategy)
+        made = cls(system.model, system.deployment, added, certificate, strategy, modules)
         # No field: a supervisor's file does not hold it.
         made.__dict__["executable"] = system
         return made
@@ -187,7 +215,8 @@ class Supervisor(msgspec.Struct, frozen=True, dict=True, omit_defaults=True):
     def __repr__(self) -> str:
         certificate = self.certificate
         strategy = "" if self.strategy is None else f", a strategy for {counted(self.executable.obligations.aims)}"
+        modules = f", {len(self.modules)} modules" if self.modules else ""
         return (
-            f"<supervisor of {self.model.name}: {self.deployment}, {certificate.states} states, "
+            f"<supervisor of {self.model.name}: {self.deployment}, {certified_states(certificate)}{modules}, "
             f"conditions added to {len(self.added)} event{'s' if len(self.added) != 1 else ''}{strategy}>"
         )

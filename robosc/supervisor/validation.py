@@ -120,7 +120,8 @@ def validate(supervisor: Supervisor) -> None:
             with _at(f"limit {number} (of {limit.communication})"):
                 _validate_limit(limit, names)
         _validate_synthesis_variables(model, names)
-        _validate_certificate(supervisor.certificate)
+        _validate_certificate(supervisor.certificate, has_modules=bool(supervisor.modules))
+        _validate_modules(supervisor)
         if supervisor.certificate.deployment is not supervisor.deployment:
             raise InvalidSupervisorError("the certificate is for another deployment than the supervisor")
         if supervisor.added:
@@ -543,7 +544,23 @@ def _synthesis_expressions(
                     yield update.expression, _received(transition, names)
 
 
-def _validate_certificate(certificate: Certificate) -> None:
+def _validate_modules(supervisor: Supervisor) -> None:
+    if not supervisor.modules:
+        return
+    model = supervisor.model
+    names = {item.name for item in supervisor.executable.automata.automata}
+    for module in supervisor.modules:
+        if (
+            not names.issuperset(module.automata)
+            or max(module.requirements, default=-1) >= len(model.requirements)
+            or max(module.invariants, default=-1) >= len(model.invariants)
+        ):
+            raise InvalidSupervisorError("a module has automata or requirements that the model does not have")
+        if not _COUNT.match(module.states) or module.states == "0":
+            raise InvalidSupervisorError("the number of states of a module is not a positive decimal number")
+
+
+def _validate_certificate(certificate: Certificate, *, has_modules: bool) -> None:
     texts = [("method", certificate.method), ("engine version", certificate.engine_version)]
     if certificate.controller is not None:
         texts.append(("method of the controller's properties", certificate.controller.method))
@@ -552,7 +569,7 @@ def _validate_certificate(certificate: Certificate) -> None:
             raise InvalidSupervisorError(
                 f"certificate: the {name} is not one line of at most {_MAXIMUM_TEXT} characters"
             )
-    if not _COUNT.match(certificate.states) or certificate.states == "0":
+    if not _COUNT.match(certificate.states) or (certificate.states == "0" and not has_modules):
         raise InvalidSupervisorError("certificate: the number of states is not a positive decimal number")
     if certificate.transitions is not None and not _COUNT.match(certificate.transitions):
         raise InvalidSupervisorError("certificate: the number of transitions is not a decimal number")

@@ -61,7 +61,7 @@ class Causes(SolvedProblem):
         """Good states, and states of the controlled system, if nothing had to hold always."""
         fixed_point = FixedPoint(self.encoding, self.monitor)
         problem = Problem(self.problem.steps, safe_states(self.encoding, ()))
-        good = fixed_point.solution(problem, known=self.good).states
+        good = fixed_point.solution_of_less(problem, self.good).states
         return good, fixed_point.reachable_states(problem, good)
 
     def _broken(self, states: Any) -> tuple[int, ...]:

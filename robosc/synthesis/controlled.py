@@ -5,11 +5,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from robosc.errors import InternalError
-from robosc.expressions import Expression
 from robosc.synthesis.causes import Causes
-from robosc.synthesis.expression_encoder import ExpressionEncoder
-from robosc.synthesis.fixed_point import FixedPoint, Problem, SolvedProblem, allowed, initial_states
-from robosc.synthesis.questions import Answers, EnabledTogether, NeverEnabled, Questions, Restriction, Unprompted
+from robosc.synthesis.conjuncts import MAXIMUM_NODES, Conjuncts
+from robosc.synthesis.fixed_point import SolvedProblem, initial_states
+from robosc.synthesis.nodes import meets
+from robosc.synthesis.questions import Answers, EnabledTogether, NeverEnabled, Questions, Unprompted
+from robosc.synthesis.restrictions import UnusedRestrictions
 from robosc.synthesis.runs import ShortestRuns, SystemRun
 from robosc.synthesis.transitions import Steps
 
@@ -26,13 +27,9 @@ class ControlledSystem(SolvedProblem):
 
     def __post_init__(self) -> None:
         self._manager = self.encoding.manager
-        self._encoder = ExpressionEncoder(self.encoding)
         self._steps = {steps.event.name: steps for steps in self.problem.steps}
         self._causes = Causes(self.encoding, self.monitor, self.problem, self.good, self.reachable)
-        self._fixed_point = FixedPoint(self.encoding, self.monitor)
-        self._known: dict[str, Any] = {}
-        self._held: dict[int, Any] = {}
-        """Predicates of the system's own conditions, by their identity: they stay as long as the system does."""
+        self._conjuncts = Conjuncts(self)
         self._effort = 0
 
     def answers(self, questions: Questions) -> Answers:
@@ -44,133 +41,30 @@ class ControlledSystem(SolvedProblem):
         """
         return Answers(
             never=tuple(self._never(questions.events)),
-            unused=self._unused(questions.restrictions),
+            unused=UnusedRestrictions(self, self._conjuncts).among(questions.restrictions),
             together=self._together(questions.rivals),
             unreached=tuple(self._unreached(questions.locations)),
             unprompted=tuple(self._unprompted(questions)),
         )
 
     def _possible(self, event: str) -> Any:
-        """The states of the controlled system in which an event can happen."""
-        found = self._known.get(event)
-        if found is None:
-            self.monitor.check_stop()
-            steps = self._steps[event]
-            found = self._known[event] = self.reachable & steps.plant & allowed(steps, self.good)
-        return found
+        """A predicate that is true of those states of the controlled system in which an event can happen."""
+        self.monitor.check_stop()
+        return self._conjuncts.possible(self._steps[event])
+
+    def _is_reached(self, states: Any) -> bool:
+        self.monitor.check_stop()
+        return meets(self._manager, self.reachable, states)
 
     def _never(self, events: Iterable[str]) -> Iterator[NeverEnabled]:
         for event in events:
-            if self._possible(event) == self._manager.false:
+            if not self._is_reached(self._possible(event)):
                 yield self._causes.of(self._steps[event])
 
     def _unreached(self, locations: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
         for automaton, location in locations:
-            self.monitor.check_stop()
-            if self.reachable & self.encoding.in_location(automaton, location) == self._manager.false:
+            if not self._is_reached(self.encoding.in_location(automaton, location)):
                 yield automaton, location
-
-    # Restrictions
-
-    def _unused(self, restrictions: Sequence[Restriction]) -> tuple[int, ...]:
-        """Those that forbid nothing in any state of the controlled system, nor anywhere that synthesis looks ahead to.
-
-        What a restriction forbids in states beyond can make these states bad, so that synthesis keeps away from
-        them: then the system would do more without it, although it never shows itself. All that are named can go
-        together; of two that could stand in for each other the later one is named.
-        """
-        candidates = tuple(place for place, item in enumerate(restrictions) if not self._restricts(item))
-        if not self._supervisor_disables():
-            # The reachable states are those that plants and conditions allow, and no others.
-            return candidates
-        found = self._removable(restrictions, [item for item in candidates if not restrictions[item].invariants], [])
-        for place in reversed(candidates):
-            # Invariants always are candidates, but mostly needed: to try several at once would be in vain.
-            if restrictions[place].invariants:
-                found = self._removable(restrictions, [place], found)
-        return tuple(sorted(found))
-
-    def _restricts(self, restriction: Restriction) -> bool:
-        """Return True if, in a controlled system state, the plant enables an event and a condition is not true."""
-        condition, broken = None, self._manager.false
-        conditions = self.encoding.system.conditions
-        for item in (*(conditions[place] for place in restriction.conditions), *restriction.watched):
-            # A requirement is mostly one condition on many events.
-            if item.condition is not condition:
-                condition, broken = item.condition, self.reachable & ~self._holds(item.condition)
-            if broken & self._steps[item.event].plant != self._manager.false:
-                return True
-        return False
-
-    def _holds(self, condition: Expression) -> Any:
-        self.monitor.check_stop()
-        found = self._held.get(id(condition))
-        if found is None:
-            found = self._held[id(condition)] = self._encoder.holds(condition)
-        return found
-
-    def _supervisor_disables(self) -> bool:
-        return any(
-            self.reachable & steps.plant & steps.condition & ~self._possible(name) != self._manager.false
-            for name, steps in self._steps.items()
-            if steps.event.is_controllable
-        )
-
-    def _removable(self, restrictions: Sequence[Restriction], more: list[int], removed: list[int]) -> list[int]:
-        """Return the restrictions that can be removed without any change to the controlled system.
-
-        They are those that are removed already, and of `more` those that can go beside them, later ones first. Where
-        all of them can go together, each can: the less is forbidden, the more is allowed. Else they are tried by
-        halves.
-        """
-        if not more or self._is_the_same_without([restrictions[place] for place in (*removed, *more)]):
-            return [*removed, *more]
-        middle = len(more) // 2
-        if middle == 0:
-            return removed
-        return self._removable(restrictions, more[:middle], self._removable(restrictions, more[middle:], removed))
-
-    def _is_the_same_without(self, restrictions: Sequence[Restriction]) -> bool:
-        """Return True if the controlled system of the problem without some restrictions allows nothing more."""
-        problem = self._without(restrictions)
-        good = self._fixed_point.solution(problem, known=self.good)
-        if good.states == self.good:
-            changed = [steps for steps in problem.steps if steps is not self._steps[steps.event.name]]
-        else:
-            # An event that changes what they read is the likeliest to be allowed where it was not.
-            read = self._read(restrictions)
-            changed = sorted(problem.steps, key=lambda steps: -len(read.intersection(steps.changed)))
-        return all(
-            self.reachable & steps.plant & allowed(steps, good.states) == self._possible(steps.event.name)
-            for steps in changed
-        )
-
-    def _read(self, restrictions: Sequence[Restriction]) -> set[str]:
-        """The variables that restrictions read."""
-        system = self.encoding.system
-        conditions = [system.conditions[place].condition for item in restrictions for place in item.conditions]
-        invariants = [system.invariants[place] for item in restrictions for place in item.invariants]
-        return set().union(*(self._manager.support(self._holds(item)) for item in (*conditions, *invariants)))
-
-    def _without(self, restrictions: Sequence[Restriction]) -> Problem:
-        """The problem without some restrictions; what they are watched for stays as it is."""
-        system = self.encoding.system
-        dropped = {place for item in restrictions for place in item.conditions}
-        touched = {system.conditions[place].event for place in dropped}
-        left = [item for place, item in enumerate(system.conditions) if place not in dropped]
-
-        def under_what_is_left(steps: Steps) -> Steps:
-            conditions = [item.condition for item in left if item.event == steps.event.name]
-            return steps.under(self.encoding.all_of(self._holds(condition) for condition in conditions))
-
-        steps = tuple(
-            under_what_is_left(steps) if steps.event.name in touched else steps for steps in self.problem.steps
-        )
-        dropped = {place for item in restrictions for place in item.invariants}
-        if not dropped:
-            return Problem(steps, self.problem.safe)
-        left_over = (self._holds(item) for place, item in enumerate(system.invariants) if place not in dropped)
-        return Problem(steps, self.encoding.all_of([self.encoding.valid_states(), *left_over]))
 
     # Prompts
 
@@ -188,6 +82,8 @@ class ControlledSystem(SolvedProblem):
         runs = self._runs_from(self._start, self.problem.steps, executed)
         reported: set[str] = set()
         for event in questions.prompted:
+            if self._effort > MAXIMUM_EFFORT:
+                return
             steps = self._steps[event]
             start = executed[event] & steps.moving() if event in questions.changing else executed[event]
             states = self._again(steps, inside, executed, start) if event not in reported else self._manager.false
@@ -198,12 +94,12 @@ class ControlledSystem(SolvedProblem):
             reported.update(loop)
             yield Unprompted(event, runs.trace_to(state), loop)
 
-    def _executed(self, silent: Sequence[str]) -> dict[str, Any]:
+    def _executed(self, silent: Sequence[str]) -> "_Executed":
         """Return for each event the states in which an executor may take it: silent events go first."""
-        possible = {name: self.reachable & allowed(steps, self.good) for name, steps in self._steps.items()}
         first = {name: self._possible(name) & self._steps[name].moving() for name in silent}
-        stable = ~self.encoding.any_of(first.values())
-        return {name: first[name] if name in first else states & stable for name, states in possible.items()}
+        stable = self.reachable & ~self.encoding.any_of(first.values())
+        possible = {name: self._possible(name) for name in self._steps if name not in first}
+        return _Executed(self.reachable, first, stable, possible)
 
     def _again(self, steps: Steps, inside: Sequence[Steps], executed: Mapping[str, Any], start: Any) -> Any:
         """Return the states, of some in which an event can happen, where it can again and again, by some events alone.
@@ -256,7 +152,8 @@ class ControlledSystem(SolvedProblem):
         pairs = list(self._pairs(groups))
         if not pairs:
             return ()
-        possible = {name: self.reachable & allowed(steps, self.good) for name, steps in self._steps.items()}
+        # Runs never leave the states of the controlled system.
+        possible = {name: self._possible(name) for name in self._steps}
         runs = self._runs_from(self._start, self.problem.steps, possible)
         return tuple(EnabledTogether(first, second, runs.trace_to(states)) for first, second, states in pairs)
 
@@ -276,12 +173,46 @@ class ControlledSystem(SolvedProblem):
             for number, second in enumerate(group):
                 here = self._possible(second)
                 # One test of all earlier events first: in most groups no two events are ever possible together.
-                rivals = group[:number] if here & earlier != self._manager.false else ()
+                rivals = group[:number] if self._is_reached(here & earlier) else ()
                 for first in rivals:
                     both = here & self._possible(first)
-                    if both != self._manager.false:
-                        yield first, second, both
+                    if self._is_reached(both):
+                        yield first, second, self.reachable & both
                         count += 1
                         if count == MAXIMUM_TOGETHER:
                             return
                 earlier = earlier | here
+
+
+class _Executed(Mapping[str, Any]):
+    """For each event the states in which an executor may take it, made when they are asked for: each may be large.
+
+    Args:
+        reachable: States of the controlled system.
+        first: For the silent events where they are taken before all others, among the states of the controlled system.
+        stable: Its states in which none of them is.
+        possible: For the other events where they can happen, among its states.
+    """
+
+    def __init__(self, reachable: Any, first: Mapping[str, Any], stable: Any, possible: Mapping[str, Any]) -> None:
+        self._reachable = reachable
+        self._first = first
+        self._stable = stable
+        self._possible = possible
+        self._small: dict[str, Any] = {}
+
+    def __getitem__(self, event: str) -> Any:
+        found = self._small.get(event)
+        if found is None:
+            among, states = (self._reachable, self._first) if event in self._first else (self._stable, self._possible)
+            found = among & states[event]
+            if found.dag_size <= MAXIMUM_NODES:
+                self._small[event] = found
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        yield from self._first
+        yield from self._possible
+
+    def __len__(self) -> int:
+        return len(self._first) + len(self._possible)

@@ -159,8 +159,10 @@ def extract(encoding: Encoding, predicate: Any, maximum: int = MAXIMUM_TOTAL) ->
     kernel = kernel_of(encoding.manager)
     if kernel is None:
         return _Extractor(encoding, maximum).diagram(predicate)
-    found = kernel.extract(predicate, encoding.levels, MAXIMUM_BRANCHES, maximum)
-    subjects = [subject for block in encoding.blocks for subject in block]
+    # Most predicates are about few places: a number is that of a place in these blocks.
+    blocks = encoding.blocks_with(encoding.manager.support(predicate))
+    found = kernel.extract(predicate, tuple(encoding.levels[block] for block in blocks), MAXIMUM_BRANCHES, maximum)
+    subjects = [subject for block in blocks for subject in encoding.blocks[block]]
     if found.refused:
         subject = subjects[found.number]
         is_total = found.refused == TOTAL

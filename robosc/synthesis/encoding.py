@@ -5,7 +5,7 @@ state. Next to it in the order, it has one for the next state if forward images 
 other values than one constant. Bits of received data are interleaved with those of the first variable, in the order,
 that the data is written to: if they were separate, a relation that copies several data would have to represent all of
 them at once. Bits of wide integers that are compared or computed with each other are interleaved, those of equal weight
-side by side: see `blocks`.
+side by side, unless these are long chains: see `blocks`.
 """
 
 from collections import defaultdict
@@ -170,14 +170,14 @@ class Encoding:
     def any_of(self, predicates: Iterable[Any]) -> Any:
         """Return the predicate that is true where one of the predicates is true."""
         result = self.manager.false
-        for predicate in predicates:
+        for predicate in _lowest_first(predicates):
             result = result | predicate
         return result
 
     def all_of(self, predicates: Iterable[Any]) -> Any:
         """Return the predicate that is true where all of the predicates are true."""
         result = self.manager.true
-        for predicate in predicates:
+        for predicate in _lowest_first(predicates):
             result = result & predicate
         return result
 
@@ -208,6 +208,19 @@ class Encoding:
             for subject, bits in self.subjects.items()
         }
         return tuple(tuple(places[subject] for subject in block) for block in self.blocks)
+
+    def blocks_with(self, names: Iterable[str]) -> list[int]:
+        """Return the numbers of the blocks in which some current-state variables are, topmost first."""
+        return sorted({self._block_of[name] for name in names})
+
+    @cached_property
+    def _block_of(self) -> dict[str, int]:
+        return {
+            name: number
+            for number, block in enumerate(self.blocks)
+            for subject in block
+            for name in self.subjects[subject].names
+        }
 
     def valid_states(self) -> Any:
         """Return the predicate that is true where every place of the state encodes a value."""
@@ -247,6 +260,11 @@ class Encoding:
     def input_names(self, event: str) -> tuple[str, ...]:
         """The variables of the data that an event carries."""
         return tuple(name for item, bits in self.inputs if item.event == event for name in _names(bits))
+
+
+def _lowest_first(predicates: Iterable[Any]) -> list[Any]:
+    """Predicates in an order in which nothing that was built of some is built anew for those above them."""
+    return sorted(predicates, key=lambda predicate: -predicate.level)
 
 
 def _names(bits: Bits) -> tuple[str, ...]:

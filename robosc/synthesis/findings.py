@@ -322,7 +322,8 @@ def _unprompted(model: Model, places: Places, found: Unprompted) -> Diagnostic:
         f"between, {_after(found.trace)}: "
         f"{_shown(found.loop)}, and so on",
         places.communications[first],
-        "Require an order message before it, or ignore this note if the robot should repeat it.",
+        "Require an order message before it, or accept the note if the robot should repeat it: write "
+        "'// robosc: accept unprompted-request: REASON' above it.",
         tuple(RelatedPlace("requested in the same loop", places.communications[name]) for name in others),
     )
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 from typing import Any
 
 from robosc.expressions import Expression
@@ -106,6 +107,9 @@ class FixedPoint:
         """The initial states."""
         self.marked = marked_states(encoding)
         """The marked states."""
+        self._ways_of_less = list(product((False, True), (FixedPoint.good_states, FixedPoint.reached_good_states)))
+        """Ways to solve a problem that restricts less, each with a flag whether it begins with what is known; the best
+        one is the first."""
 
     def solution(self, problem: Problem, known: Any) -> GoodStates:
         """The good states, of which some that no run reaches may be left out.
@@ -122,6 +126,29 @@ class FixedPoint:
         return self._first_of(
             lambda solver: solver.good_states(problem, known), lambda solver: solver.reached_good_states(problem, known)
         )
+
+    def solution_of_less(self, problem: Problem, good: Any) -> GoodStates:
+        """The solution of a problem that restricts less than another one whose good states are known.
+
+        Those are good here, too. But what else is to be found from them may come in few steps, each of which works on
+        their whole diagram, or from the marked states alone in steps that cost far less. So all ways race, and the
+        winner of one problem has the head start in the next one.
+
+        Args:
+            problem: The problem.
+            good: The good states of the other one.
+        """
+        if self._encoding.system.is_controlled:
+            return self._given(problem)
+        ways, nothing = self._ways_of_less, self._encoding.manager.false
+        found, place = self._first_of(
+            *(
+                partial(_way_of_less, way, problem, good if begins else nothing, place)
+                for place, (begins, way) in enumerate(ways)
+            )
+        )
+        ways.insert(0, ways.pop(place))
+        return found
 
     def _given(self, problem: Problem) -> GoodStates:
         """The states that a supervisor may be in which is in the system already: all that it lets be."""
@@ -260,6 +287,15 @@ class FixedPoint:
         for steps in problem.steps:
             self._monitor.check_stop()
             yield steps
+
+
+Way = Callable[[FixedPoint, Problem, Any], GoodStates]
+"""Function that finds the good states of a problem, given some that are known to be good."""
+
+
+def _way_of_less(way: Way, problem: Problem, known: Any, place: int, solver: FixedPoint) -> tuple[GoodStates, int]:
+    """Return what one of several ways finds, with its place among them."""
+    return way(solver, problem, known), place
 
 
 def _kept(steps: Steps, name: str, make: Callable[[], Step]) -> Step:

@@ -6,7 +6,7 @@ from typing import Any
 import msgspec
 
 from robosc.synthesis.engines import Manager
-from robosc.synthesis.nodes import met, renamed
+from robosc.synthesis.nodes import assigned, met, renamed
 
 
 class Image(msgspec.Struct, frozen=True, kw_only=True):
@@ -15,7 +15,8 @@ class Image(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         manager: The manager of all predicates.
         inside: States that count.
-        needed: States without any of which nothing comes of a set; None if that is not known.
+        needed: Predicate that variables have the values of `constants`: nothing comes of a set without such states.
+            None if there are no such values.
         constants: Truth values that variables take.
         functions: Predicates that variables take, all at once.
         relation: Predicate that is conjoined.
@@ -42,7 +43,7 @@ class Image(msgspec.Struct, frozen=True, kw_only=True):
         if self.needed is not None and states & self.needed == manager.false:
             return manager.false
         if self.constants:
-            states = manager.let(self.constants, states)
+            states = assigned(manager, self.constants, self.needed, states)
         if self.functions:
             states = manager.let(self.functions, states)
         states = met(manager, self.hidden, states, self.relation)

@@ -13,6 +13,9 @@ from robosc.dd_modules import load_dd
 from robosc.synthesis.compiled import kernel_of
 from robosc.synthesis.engines import Manager, is_compiled, is_reordering
 
+_SMALL = 100
+"""Nodes up to which a predicate is small."""
+
 
 def cofactors(node: Any) -> tuple[Any, Any]:
     """The predicates where a node's variable is false and true: a complemented edge complements both."""
@@ -28,6 +31,11 @@ def implies(manager: Manager, node: Any, other: Any) -> bool:
     """Return True if a predicate is true only where another one is; CUDD makes no node for that."""
     kernel = kernel_of(manager)
     return bool(node & ~other == manager.false) if kernel is None else kernel.implies(node, other)
+
+
+def meets(manager: Manager, node: Any, other: Any) -> bool:
+    """Return True if two predicates are true together somewhere; CUDD makes no node for that."""
+    return not implies(manager, node, ~other)
 
 
 def met(manager: Manager, names: Sequence[str], node: Any, other: Any) -> Any:
@@ -46,6 +54,22 @@ def met(manager: Manager, names: Sequence[str], node: Any, other: Any) -> Any:
 def _and_exists() -> Callable[[Any, Any, Sequence[str]], Any]:
     function: Callable[[Any, Any, Sequence[str]], Any] = load_dd("cudd").and_exists
     return function
+
+
+def assigned(manager: Manager, values: Mapping[str, bool], cube: Any, node: Any) -> Any:
+    """A predicate in which variables have some values.
+
+    Args:
+        manager: The manager of all predicates.
+        values: The values.
+        cube: The predicate that the variables have these values.
+        node: The predicate.
+    """
+    kernel = kernel_of(manager)
+    # dd goes through all variables of CUDD to make the cube again: that takes longer than most small predicates.
+    if kernel is not None and node.dag_size <= _SMALL:
+        return kernel.restrict(node, cube)
+    return manager.let(values, node)
 
 
 def renamed(manager: Manager, names: Mapping[str, str], node: Any) -> Any:

@@ -214,7 +214,7 @@ def hyperedges(system: System) -> tuple[frozenset[Subject], ...]:
         touched[item.event] |= subjects_read(item.condition)
     found.update((frozenset(touched[event.name]), None) for event in system.events)
     on_events = (item.condition for item in (*system.conditions, *system.plant_conditions))
-    # Where the system begins and what is marked is mostly one long list, of which the parts alone say anything.
+    # The initial and the marked predicate are mostly one long list, of which the parts alone say anything.
     for condition in (system.initial, system.marker):
         found.update((subjects_read(part), None) for part in simple_parts(condition))
     for condition in (*on_events, *system.invariants, *system.plant_invariants):

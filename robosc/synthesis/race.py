@@ -124,7 +124,7 @@ class Race(ProgressMonitor):
                 winner = self._led_by(left[0], left[1:])
             except NodeLimitError:
                 left[0].is_given_up = True
-                # What was given up for the sake of the first one has another chance.
+                # A way that was given up for the sake of the first one has another chance.
                 left = [runner for runner in left[1:] if not runner.is_given_up or runner.is_dismissed]
                 if not left:
                     raise
@@ -216,7 +216,7 @@ class Race(ProgressMonitor):
                 rival.turn.release()
                 _join(rival.thread)
                 rival.thread, rival.turn = None, _held_lock()
-        # Whoever was dismissed has handed back a turn that nobody waits for.
+        # A dismissed way has handed back a turn that nobody waits for.
         self._back = _held_lock()
 
     # The thread of a rival

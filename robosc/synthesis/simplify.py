@@ -13,6 +13,7 @@ ICCAD 1990, pp. 126-129 (restrict).
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
+from functools import cached_property
 from time import monotonic
 from typing import Any
 
@@ -103,19 +104,18 @@ class Simplifier:
             return None
         if implies(self._manager, care, ~wanted):
             return extract(self._encoding, self._manager.false)
-        plain = wanted & self._encoding.valid_states()
         if self._is_over():
             with suppress(UnsupportedModelError):
-                return extract(self._encoding, plain)
+                return extract(self._encoding, self._plain(wanted))
         is_large = care.dag_size > MAXIMUM_NODES
-        simple = plain if is_large and self._vain == MAXIMUM_VAIN else self._restricted(wanted, care, plain)
+        simple = self._plain(wanted) if is_large and self._vain == MAXIMUM_VAIN else self._restricted(wanted, care)
         places = self._places(simple)
-        first = extract(self._encoding, simple) if is_large or len(places) == 1 else None
+        first = self._extracted(simple, wanted, care) if is_large or len(places) == 1 else None
         if first is not None and (is_large or self._length(first) < _SHORT):
             return first
         found: dict[DecisionDiagram, _Length] = {}
         limit = OPERANDS
-        for diagram in self._others(places, care & wanted, care & ~wanted):
+        for diagram in self._others(places, wanted, care):
             if self._is_over():
                 break
             if diagram in found:
@@ -125,25 +125,51 @@ class Simplifier:
                 limit = min(limit, found[diagram][1][0])
         if all(length[0] for length in found.values()) or len(places) <= limit:
             # The restricted form needs a test of each of its places, and is mostly the longest: soon given up.
-            first = extract(self._encoding, simple)
+            first = self._extracted(simple, wanted, care)
             found = {first: self._length(first, limit), **found}
         best = min(found, key=lambda diagram: found[diagram])
         if found[best] <= _READABLE:
             return best
         with self._formulas.within(self._more):
-            for diagram in self._wider(wanted, care & wanted, care & ~wanted):
+            for diagram in self._wider(wanted, care):
                 if self._is_over():
                     break
                 if diagram not in found:
                     found[diagram] = self._length(diagram, SHORT)
         return min(found, key=lambda diagram: found[diagram])
 
-    def _restricted(self, wanted: Any, care: Any, plain: Any) -> Any:
+    def _plain(self, wanted: Any) -> Any:
+        """A condition as it is, where the codes stand for values."""
+        return wanted & self._encoding.valid_states()
+
+    def _restricted(self, wanted: Any, care: Any) -> Any:
         """Return the smaller of a condition as it is and of one that was restricted to the states that matter."""
         found = restrict(self._manager, wanted, care)
-        is_larger = found.dag_size > plain.dag_size
+        # A condition as it is has a node for each of these variables; it is true somewhere.
+        least = (
+            len(self._restraining - self._manager.support(wanted)) if found.dag_size <= len(self._restraining) else 0
+        )
+        is_larger = found.dag_size > least and found.dag_size > self._plain(wanted).dag_size
         self._vain = self._vain + 1 if is_larger else 0
-        return plain if is_larger else found
+        return self._plain(wanted) if is_larger else found
+
+    @cached_property
+    def _restraining(self) -> set[str]:
+        """The variables that decide about which codes stand for values."""
+        return self._manager.support(self._encoding.valid_states())
+
+    def _extracted(self, simple: Any, wanted: Any, care: Any) -> DecisionDiagram:
+        """Return the diagram of a restricted condition, or of what is wanted over the places that decide about it.
+
+        Restricting keeps relations to places of which others tell all that matters. Of several places of a thousand
+        values each these are too many for a diagram.
+        """
+        try:
+            return extract(self._encoding, simple)
+        except UnsupportedModelError:
+            tested = self._places(simple)
+            positive, _ = self._needed(tested, *self._over(tested, wanted, care))
+            return extract(self._encoding, positive)
 
     def _is_over(self) -> bool:
         return self._end is not None and monotonic() >= self._end
@@ -157,23 +183,23 @@ class Simplifier:
             formula = self._formulas.formula(diagram, limit=limit)
         return formula is None, length(TRUE if formula is None else formula), nodes
 
-    def _others(self, tested: set[Subject], positive: Any, negative: Any) -> Iterator[DecisionDiagram]:
-        """Other conditions over some places that are true in the positive states and false in the negative ones."""
+    def _others(self, tested: set[Subject], wanted: Any, care: Any) -> Iterator[DecisionDiagram]:
+        """Other conditions over some places that are as wanted in the states that matter."""
         if len(tested) > MAXIMUM_SUBJECTS:
             return
         # The two sets stay disjoint: a condition over the remaining places distinguishes them.
-        positive, negative = self._over(tested, positive, negative)
+        positive, negative = self._over(tested, wanted, care)
         if max(positive.dag_size, negative.dag_size) <= MAXIMUM_KEPT_NODES:
             yield from self._conditions_between(*self._needed(tested, positive, negative))
 
-    def _wider(self, wanted: Any, positive: Any, negative: Any) -> Iterator[DecisionDiagram]:
+    def _wider(self, wanted: Any, care: Any) -> Iterator[DecisionDiagram]:
         """Other conditions over few places, chosen from all places that a condition tests.
 
         Places may depend on each other, such as those of a token that is in one of them. Restricting may then leave out
         a place whose one test replaces the tests of many others.
         """
         places = self._places(wanted)
-        positive, negative = self._over(places, positive, negative)
+        positive, negative = self._over(places, wanted, care)
         effort = 2 * len(places) * (positive.dag_size + negative.dag_size)
         if len(places) > MAXIMUM_SUBJECTS or effort > self._left:
             return
@@ -187,10 +213,13 @@ class Simplifier:
         """The places that predicates depend on."""
         return {self._home[name] for item in predicates for name in self._manager.support(item)}
 
-    def _over(self, places: set[Subject], positive: Any, negative: Any) -> tuple[Any, Any]:
-        """The values that some places have in the states."""
+    def _over(self, places: set[Subject], wanted: Any, care: Any) -> tuple[Any, Any]:
+        """The values that some places have in the states that matter, where a condition is true and where not."""
         away = [without(self._manager, self._variables, [self._cubes[subject] for subject in places])]
-        return without(self._manager, positive, away), without(self._manager, negative, away)
+        if self._places(wanted) <= places:
+            near = without(self._manager, care, away)
+            return near & wanted, near & ~wanted
+        return without(self._manager, care & wanted, away), without(self._manager, care & ~wanted, away)
 
     def _conditions_between(self, positive: Any, negative: Any) -> Sequence[DecisionDiagram]:
         """Conditions that are true in the positive states and false in the negative ones."""

@@ -20,6 +20,11 @@ from robosc.synthesis.changes import Leads, leads_of
 from robosc.synthesis.encoding import Bits, Encoding, next_name
 from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.image import Image
+from robosc.synthesis.nodes import assigned
+
+MAXIMUM_SUBSTITUTED = 300
+"""Nodes of what an event writes up to which it is substituted in a set of states to find those before it. Substituting
+much more takes many times as long as the relation between both, as where many edges of one event write few bits."""
 
 
 class Transition(msgspec.Struct, frozen=True):
@@ -254,6 +259,10 @@ class Steps:
         true, false = self._manager.true, self._manager.false
         self._constants = {name: f == true for name, f in transition.functions.items() if f in (true, false)}
         self._composed = {name: f for name, f in transition.functions.items() if name not in self._constants}
+        self.arrival = encoding.all_of(
+            self._manager.var(name) if value else ~self._manager.var(name) for name, value in self._constants.items()
+        )
+        """States that have all that the event writes as a constant: it leads to no other ones."""
         self.leaving = self._without_hidden(transition.possible & transition.out_of_range)
         """States in which the event can take a variable out of its range."""
         self._in_range = transition.possible & ~transition.out_of_range
@@ -278,10 +287,6 @@ class Steps:
         self._state_names = encoding.state_names
         self.changed = tuple(transition.functions)
         """The current-state variables that it changes."""
-        self.arrival = encoding.all_of(
-            self._manager.var(name) if value else ~self._manager.var(name) for name, value in self._constants.items()
-        )
-        """States that have all that the event writes as a constant: it leads to no other ones."""
         self.made: dict[str, Any] = {}
         """Predicates made of the event, by name, for as long as its conditions and data stay as they are."""
 
@@ -328,13 +333,17 @@ class Steps:
         Args:
             source: States that count as such; None if all do.
         """
+        functions, relation, hidden = self._composed, self._in_range, self._transition.hidden
+        if sum(function.dag_size for function in functions.values()) > MAXIMUM_SUBSTITUTED:
+            functions = {name: self._manager.var(next_name(name)) for name in functions}
+            relation, hidden = self._relation, tuple(map(next_name, functions))
         return Image(
             manager=self._manager,
             needed=self.arrival,
             constants=self._constants,
-            functions=self._composed,
-            relation=self._in_range,
-            hidden=self._transition.hidden,
+            functions=functions,
+            relation=relation,
+            hidden=hidden,
             outside=source,
         )
 
@@ -383,7 +392,7 @@ class Steps:
         """Return the predicate that another will be true after the event, by substituting next-state functions."""
         # Constants first: what the other functions bring in are values from before the event.
         if self._constants:
-            predicate = self._manager.let(self._constants, predicate)
+            predicate = assigned(self._manager, self._constants, self.arrival, predicate)
         return self._manager.let(self._composed, predicate) if self._composed else predicate
 
     def _without_hidden(self, predicate: Any) -> Any:

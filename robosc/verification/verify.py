@@ -8,6 +8,8 @@ from robosc.automata.controlled import TRANSITIONS_PER_STATE
 from robosc.automata.decision import Decision
 from robosc.automata.semantics import Semantics
 from robosc.automata.structure import System
+from robosc.expressions import Expression
+from robosc.expressions.text import expression_text
 from robosc.verification.explicit_check import CheckOutcome, Verification, verify_explicitly
 
 DEFAULT_STATES = 200_000
@@ -62,6 +64,7 @@ def verify(
     expected_states: int = 0,
     engine: str = "auto",
     semantics: Semantics | None = None,
+    text: Callable[[Expression], str] = expression_text,
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[str], None] = lambda message: None,
 ) -> VerificationReport:
@@ -76,6 +79,7 @@ def verify(
             by one is not even begun.
         engine: Engine of the symbolic search: see `verify_symbolically`.
         semantics: Semantics of the system, if it was made already.
+        text: Function that writes a condition of the system, for what fails.
         should_stop: Function called now and then; once it returns true, the work ends.
         on_progress: Function called now and then with the progress of the work, in one short line.
 
@@ -90,7 +94,7 @@ def verify(
             initial=initial,
             limit=limits.states,
             permissive_limit=0 if system.is_controlled else limits.recomputed,
-            semantics=semantics,
+            semantics=semantics or Semantics(system, text),
             should_stop=should_stop,
             on_progress=on_progress,
         )

@@ -19,6 +19,7 @@ SIZES = (100, 300, 1000)
 KINDS = ("pairs", "ring", "hub", "neighbours")
 COMMANDS = {
     "synth": ["synth"],
+    "synth --modular": ["synth", "--modular"],
     "python": ["generate", "--target", "python", "-o", "out"],
     "c99": ["generate", "--target", "c99", "-o", "out"],
     "ros2": ["generate", "--target", "ros2", "-o", "out"],

@@ -28,6 +28,7 @@ import cold_start
 import conditions
 import editor
 import execution
+import execution.large_cycles
 import families
 import goal_checks
 import goals
@@ -44,6 +45,7 @@ _MODULES = (
         conditions,
         editor,
         execution,
+        execution.large_cycles,
         families,
         goal_checks,
         goals,

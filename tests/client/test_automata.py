@@ -51,6 +51,8 @@ COMMANDS = {
     "verify": ["verify"],
     "verify --strict": ["verify", "--strict", "--limit", "10"],
     "verify --quiet": ["verify", "--quiet"],
+    "verify --controller": ["verify", "--controller"],
+    "verify --as-is": ["verify", "--as-is", "--controller"],
 }
 
 Run = Callable[..., tuple[int, str, str]]
@@ -202,9 +204,14 @@ class TestCommands:
 
     def test_what_is_of_automata_is_refused_for_robots(self, folder: Path, both: Run) -> None:
         Path("robot.rscd").write_text("robot R { component C { incoming message m with type: none } }")
-        assert "--modular is for automata" in both("synth", "robot.rscd", "--modular")[2]
+        assert both("synth", "robot.rscd", "--modular")[0] == 0
+        assert both("explain-synthesis", "robot.rscd", "--modular", "--event", "m")[0] == 0
+        assert "leave it out with --state" in both("explain-synthesis", "robot.rscd", "--modular", "--after", "m")[2]
+        assert "as a whole" in both("explain-synthesis", "models/tank.cif", "--modular")[2]
         generate = ("generate", "robot.rscd", "--target", "python", "-o", "out", "--initial", "C = a")
         assert "a robot begins in one state" in both(*generate)[2]
+        for option in ("--controller", "--as-is"):
+            assert f"{option} is for automata" in both("verify", "robot.rscd", option, "--property", "AG true")[2]
 
     def test_a_file_that_is_not_there(self, folder: Path, both: Run) -> None:
         assert both("synth", "none.cif") == (2, "", "robosc: there is no file none.cif\n")
@@ -274,6 +281,13 @@ class TestJobs:
         assert json.loads(Path("graph.json").read_text())["initial_states"] == [0, 1, 2]
         verified = self.submitted(remote, "verify", "models/tank.cif", "--strict")
         assert json.loads(remote("get", verified, "--result")[1])["status"] == "passed"
+        properties = self.submitted(remote, "verify", "models/tank.cif", "--controller", "--as-is")
+        assert set(json.loads(remote("get", properties, "--result")[1])["controller"]["checks"]) == {
+            "bounded_response",
+            "finite_response",
+            "confluence",
+            "nonblocking_under_control",
+        }
         generated = self.submitted(
             remote, "generate", "models/several.cif", "--target", "python", "--initial", "tank.level = 1"
         )
@@ -312,6 +326,9 @@ class TestPython:
         assert decode_system(remote.supervisor) == local.supervisor
         assert local.supervisor.modules == decode_system(remote.supervisor).modules
         assert client.verify(model, is_strict=True).report == robosc.verify(model, is_strict=True).report
+        for controller, as_is in ((True, False), (False, True), (True, True)):
+            remotely = client.verify(model, controller=controller, as_is=as_is)
+            assert remotely.report == robosc.verify(model, controller=controller, as_is=as_is).report
         assert client.generate(model, "c99") == robosc.generate(model, "c99")
         assert client.explain(model) == robosc.explain(model)
         graph, explored = robosc.explore(model).graph, client.explore(model).graph
@@ -336,9 +353,6 @@ class TestPython:
             client.verify(automata(), "invariant true")
         with pytest.raises(RequestRefusedError, match="log_events applies to RoboSC models"):
             client.generate(automata(), "python", robosc.GenerateOptions(log_events=True))
-        robot = robosc.load(text="robot R { component C { incoming message m with type: none } }")
-        with pytest.raises(RequestRefusedError, match="modular applies to automata"):
-            client.synthesize(robot, is_modular=True)
 
 
 class TestAnswers:

@@ -92,8 +92,10 @@ def test_check(client: Client, model: robosc.LoadedModel) -> None:
     assert isinstance(remote, robosc.Findings)
 
 
-def test_synthesize(client: Client, model: robosc.LoadedModel) -> None:
-    local, remote = robosc.synthesize(model), client.synthesize(model)
+@pytest.mark.parametrize("is_modular", [False, True])
+def test_synthesize(client: Client, model: robosc.LoadedModel, is_modular: bool) -> None:
+    local = robosc.synthesize(model, is_modular=is_modular)
+    remote = client.synthesize(model, is_modular=is_modular)
     is_made = local.supervisor is not None
     if local.status is robosc.SynthesisStatus.UNSUPPORTED_MODEL:
         # The server stops before it has anything to say of the text.
@@ -247,9 +249,8 @@ def test_values_that_mean_the_same_are_the_same() -> None:
 def test_parameters_have_the_same_names(name: str) -> None:
     local = list(inspect.signature(getattr(robosc, name)).parameters)
     remote = list(inspect.signature(getattr(Client, name)).parameters)[1:]
-    # Work here is stopped by a function, and there by a deadline; pages of findings, and checks of the controller that
-    # automata make, are here alone.
-    assert [item for item in local if item not in ("should_stop", "on_progress", "code", "controller")] == [
+    # Work here is stopped by a function, and there by a deadline; pages of findings are here alone.
+    assert [item for item in local if item not in ("should_stop", "on_progress", "code")] == [
         item for item in remote if item not in ("deadline_s", "on_progress")
     ]
 

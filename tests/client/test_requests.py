@@ -86,6 +86,8 @@ def test_every_field_of_every_request_says_what_was_meant() -> None:
             maximum_nodes=3,
             maximum_states=9,
             is_strict=True,
+            controller=True,
+            as_is=True,
         )
     ) == pb.VerifyRequest(
         bundle=sent,
@@ -97,5 +99,7 @@ def test_every_field_of_every_request_says_what_was_meant() -> None:
         property_files=[pb.SourceFile(name="p", text="AG b")],
         maximum_states=9,
         strict=True,
+        controller=True,
+        as_is=True,
     )
     assert request_of(Verify(model=bundle)) == pb.VerifyRequest(bundle=sent, options=pb.SynthesisOptions())

@@ -82,7 +82,7 @@ async function generate(bundle: Bundle, target: string) {
   let listed: { path: string; size: bigint; digest: Uint8Array; executable: boolean }[] = [];
   let digest = "";
   const stream: ClientReadableStream<GenerateResponse> = synthesis.generate(
-    { bundle, options: undefined, target, generation: undefined, initial: "" },
+    { bundle, options: undefined, target, generation: undefined, initial: "", modular: false },
     metadata,
     limits(),
   );

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, cast
 
 import grpc
 import pytest
@@ -79,7 +79,10 @@ class TestAcceptance:
         for kind, more in (
             (TaskKind.SYNTHESIZE, {"modular": True}),
             (TaskKind.GENERATE, {"initial": "tank.level = 1"}),
+            (TaskKind.GENERATE, {"modular": True}),
             (TaskKind.VERIFY, {"strict": True}),
+            (TaskKind.VERIFY, {"controller": True}),
+            (TaskKind.VERIFY, {"as_is": True}),
         ):
             assert key(kind) != key(kind, **more)
 
@@ -137,15 +140,21 @@ class TestAcceptance:
         assert refusal(TaskKind.CHECK, request(TaskKind.CHECK, plain)).startswith("libraries: plain automata import no")
 
     def test_what_is_of_automata_is_refused_for_robots(self) -> None:
-        for kind, name, value in (
-            (TaskKind.SYNTHESIZE, "modular", True),
-            (TaskKind.GENERATE, "initial", "A = a"),
-        ):
-            message = small_request(kind)
-            setattr(message, name, value)
-            assert refusal(kind, message) == f"{name} applies to automata, and the request has a RoboSC model"
+        message = small_request(TaskKind.GENERATE)
+        message.initial = "A = a"
+        problem = "initial applies to automata, and the request has a RoboSC model"
+        assert refusal(TaskKind.GENERATE, message) == problem
+        message = request(TaskKind.EXPLAIN, cif(), modular=True)
+        assert refusal(TaskKind.EXPLAIN, message).startswith("modular applies to RoboSC models")
+        message = small_request(TaskKind.EXPLAIN)
+        message.modular, message.state = True, "A.a"
+        assert refusal(TaskKind.EXPLAIN, message).startswith("modular explains events")
         message = pb.VerifyRequest(bundle=small_request(TaskKind.CHECK).bundle, strict=True)
         assert "apply only to a given supervisor" in refusal(TaskKind.VERIFY, message)
+        for name in ("controller", "as_is"):
+            message = pb.VerifyRequest(bundle=small_request(TaskKind.CHECK).bundle, supervisor=b"x")
+            setattr(message, name, True)
+            assert refusal(TaskKind.VERIFY, message) == "controller and as_is apply only to automata"
 
     def test_targets_that_cannot_be_are_refused(self) -> None:
         message = request(TaskKind.GENERATE, cif(), target="all")
@@ -182,7 +191,8 @@ class TestWork:
         assert (finding.code, finding.message) == ("cif-import", f"there is no file '{name}' that can be read")
 
     def test_a_supervisor_is_that_of_the_library(self) -> None:
-        local = robosc.synthesize(robosc.load(text=TWO_TANKS, name="tank.cif"), is_modular=True)
+        model = robosc.load(text=TWO_TANKS, name="tank.cif")
+        local = cast(robosc.SystemSynthesis, robosc.synthesize(model, is_modular=True))
         assert local.supervisor is not None
         message = request(TaskKind.SYNTHESIZE, cif(TWO_TANKS), modular=True)
         (answer,) = answers(TaskKind.SYNTHESIZE, message)

@@ -12,6 +12,7 @@ from robosc.automata.executable import CALLED_KINDS
 from robosc.automata.plants import PLANT_LOCATIONS, communication_plant_name
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.clock import ManualClock
+from robosc.execution.runtime.decision import RandomPolicy
 from robosc.execution.runtime.executor import Executor
 from robosc.execution.runtime.protocol import DataDoesNotFit, MissingData
 from robosc.execution.runtime.runner import Status
@@ -71,25 +72,23 @@ def built(supervisor: Supervisor, program: str, folder: Path, *options: str) -> 
     return folder / "test"
 
 
-class Splitmix:
+class Splitmix(RandomPolicy):
     """The policy `random` of generated C."""
 
     def __init__(self, seed: int) -> None:
+        super().__init__(seed)
         self._state = seed & _MASK
 
-    def choose(self, candidates: Sequence[int]) -> int:
+    def choose(self, among: Sequence[int] | None = None) -> int | None:
         """One of the candidates."""
+        candidates = self.enabled if among is None else among
+        if not candidates:
+            return None
         z = self._state = (self._state + 0x9E3779B97F4A7C15) & _MASK
         z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & _MASK
         z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & _MASK
         z ^= z >> 31
         return candidates[((z >> 32) * len(candidates)) >> 32]
-
-    def issued(self, request: int) -> None:
-        """Do nothing."""
-
-    def close(self, enabled: tuple[int, ...]) -> None:
-        """Do nothing."""
 
 
 class Reference:

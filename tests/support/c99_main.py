@@ -22,6 +22,7 @@ from robosc.targets.code.c.layout import Layout, event_data
 from robosc.targets.code.c.provide import Field, request_field
 from robosc.targets.code.c.source import source_file
 from robosc.targets.code.c.unit import make_unit
+from support.c99_changes import check_changes
 
 _TOP = """
 #include "@p@.h"
@@ -421,7 +422,8 @@ class _Program:
             '    printf(" status %d fault %d counters %u %u %u\\n", (int)@p@_status(&r, now_us), @p@_fault(&r) != 0,'
             " (unsigned)r.counters.unknown, (unsigned)r.counters.unexpected, (unsigned)r.counters.faults);"
         )
-        return "\n".join([*lines, "}", ""])
+        lines.append("    check_changes();")
+        return "\n".join([check_changes(layout), *lines, "}", ""])
 
 
 def _print_value(type_: Type, place: str) -> str:

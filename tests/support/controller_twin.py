@@ -63,14 +63,23 @@ class _Wanted:
 
     def __init__(self, number: int) -> None:
         self._number = number
+        self.enabled = frozenset({number})
 
-    def choose(self, candidates: Any) -> int:
-        assert self._number in candidates
+    def enable(self, request: int) -> None: ...
+
+    def disable(self, request: int) -> None:
+        assert request != self._number
+
+    def choose(self, among: Any = None) -> int:
+        assert among is None or self._number in among
         return self._number
+
+    def withhold(self, request: int) -> None:
+        raise AssertionError(request)
 
     def issued(self, request: int) -> None: ...
 
-    def close(self, enabled: Any) -> None: ...
+    def close(self) -> None: ...
 
 
 def _nothing(*names: str) -> str:
@@ -151,8 +160,10 @@ class World:
     def moves(self) -> Iterator[tuple[Move, bool]]:
         """Yield every move that may happen now, and True if it may under every setting."""
         model = self.system.supervisor.model
-        for number in self.executor._decisions._find_enabled():
-            yield ("request", self.executor._request_names[number]), True
+        for number in self.executor._system.enabled_requests():
+            name = self.executor._request_names[number]
+            if not self.executor._goals.is_open(name):
+                yield ("request", name), True
         topics: dict[str, list[Any]] = {}
         for item in model.communications:
             if item.kind is CommunicationKind.OUTGOING_MESSAGE:

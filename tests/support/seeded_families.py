@@ -311,6 +311,48 @@ def pairs(size: int, seed: int) -> System:
     return replace(system(*automata), invariants=tuple(apart))
 
 
+def _stage(name: str, high: int, *, falls: bool = False) -> Automaton:
+    """A counter that goes up by command, and down by command or by itself."""
+    level = read(f"{name}.at")
+    down = f"{'u_' if falls else ''}{name}_down"
+    moves = [
+        edge(f"still -{name}_up-> still", operation(level, "<", high), at=operation(level, "+", 1)),
+        edge(f"still -{down}-> still", operation(level, ">", 0), at=operation(level, "-", 1)),
+    ]
+    return automaton(name, moves, variables=[DiscreteVariable("at", IntegerType(0, high), (0,))])
+
+
+def axes(size: int, seed: int) -> System:
+    """Axes that lift one long load: of two neighbours none is far ahead of the other; some sink by themselves."""
+    dice = Random(seed)
+    automata = [_stage(f"A{number}", 20, falls=dice.random() < 0.1) for number in range(size)]
+    level = []
+    for one, other in pairwise(range(size)):
+        slack = dice.randrange(3, 7)
+        low, high = read(f"A{one}.at"), read(f"A{other}.at")
+        level += [
+            operation(low, "<=", operation(high, "+", slack)),
+            operation(high, "<=", operation(low, "+", slack)),
+        ]
+    return replace(system(*automata), invariants=tuple(level))
+
+
+def loads(size: int, seed: int) -> System:
+    """Bins that are filled and emptied, in groups that overlap in a bin; what a group holds together is bounded."""
+    dice = Random(seed)
+    automata = [_stage(f"B{number}", 20) for number in range(size)]
+    bounds = []
+    first = 0
+    while first + 1 < size:
+        last = min(size - 1, first + dice.randrange(3, 6))
+        total: Expression = read(f"B{first}.at")
+        for number in range(first + 1, last + 1):
+            total = operation(total, "+", read(f"B{number}.at"))
+        bounds.append(operation(total, "<=", 12 * (last - first + 1)))
+        first = last
+    return replace(system(*automata), invariants=tuple(bounds))
+
+
 def _without_chance(make: Callable[[int], System], parts_of_one: int, size: int, seed: int) -> System:
     del seed
     return make(max(1, size // parts_of_one))
@@ -333,6 +375,8 @@ SEEDED_FAMILIES: dict[str, Callable[[int, int], System]] = {
     "ring of machines": ring_of_machines,
     "hub": hub,
     "pairs": pairs,
+    "axes": axes,
+    "loads": loads,
     "random network": random_robot,
 }
 """Systems by family; the arguments are about how many parts they have, and the seed of their chances."""

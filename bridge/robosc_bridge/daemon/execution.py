@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from robosc.execution.interpreter import InterpretedSystem
+from robosc.execution.interpreter import WatchingSystem
 from robosc.execution.runtime.clock import Clock
 from robosc.execution.runtime.event_log import EventLog
 from robosc.execution.runtime.executor import Executor
@@ -75,7 +75,7 @@ class Execution:
         self._requesters = requesters
         self._clock = clock
         self._log = log
-        self._system: InterpretedSystem | None = None
+        self._system: WatchingSystem | None = None
         # Another run is another state, whatever its system has counted.
         self._run = 0
         self._has_begun = False
@@ -102,8 +102,8 @@ class Execution:
         self.due_s = self._clock.monotonic()
         return self.executor
 
-    def _made(self) -> tuple[Executor | Layer, InterpretedSystem]:
-        system = InterpretedSystem(self._job.supervisor)
+    def _made(self) -> tuple[Executor | Layer, WatchingSystem]:
+        system = WatchingSystem(self._job.supervisor)
         settings, clock, log = self._job.settings, self._clock, self._log
         if self._job.is_layer:
             return Layer(system, self._robot, self._requesters, settings, clock, log), system

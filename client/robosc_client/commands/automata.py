@@ -85,9 +85,16 @@ class Server:
         return automata_exploration_of(found, model)
 
     def verify(
-        self, model: "LoadedAutomata", options: SynthesisOptions, *, maximum_states: int, is_strict: bool
+        self,
+        model: "LoadedAutomata",
+        options: SynthesisOptions,
+        *,
+        maximum_states: int,
+        is_strict: bool,
+        controller: bool,
+        as_is: bool,
     ) -> "Verification":
-        """Synthesize the supervisor, and verify it."""
+        """Synthesize the supervisor, unless automata are verified `as_is`, and verify it."""
         from robosc_client.outcomes import require_automata_report
 
         if maximum_states < 1:
@@ -98,6 +105,8 @@ class Server:
                 options=_sendable(options),
                 maximum_states=maximum_states,
                 is_strict=is_strict,
+                controller=controller,
+                as_is=as_is,
                 deadline_s=self._deadline_s,
                 on_progress=line.report,
             )
@@ -111,6 +120,7 @@ class Server:
         options: SynthesisOptions,
         *,
         initial: str | None,
+        is_modular: bool,
     ) -> "Generation":
         """Generate the files of a target."""
         with ProgressLine() as line:
@@ -120,6 +130,7 @@ class Server:
                 generation,
                 _sendable(options),
                 initial=initial,
+                is_modular=is_modular,
                 deadline_s=self._deadline_s,
                 on_progress=line.report,
             )
@@ -166,7 +177,9 @@ def task_of(arguments: argparse.Namespace, package: str | None) -> Task:
             return Synthesize(automata.loaded_for_synthesis(arguments), options, arguments.modular)
         case "generate":
             model = automata.loaded_for_generation(arguments)
-            return Generate(model, arguments.target, GenerateOptions(package=package), options, arguments.initial)
+            return Generate(
+                model, arguments.target, GenerateOptions(package=package), options, arguments.initial, arguments.modular
+            )
         case "explore":
             return Explore(automata.loaded(arguments), options, arguments.limit)
         case "explain-synthesis":
@@ -186,6 +199,8 @@ def task_of(arguments: argparse.Namespace, package: str | None) -> Task:
                 maximum_nodes=options.maximum_nodes,
                 maximum_states=arguments.limit,
                 is_strict=arguments.strict,
+                controller=arguments.controller,
+                as_is=arguments.as_is,
             )
 
 

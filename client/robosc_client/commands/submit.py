@@ -13,13 +13,14 @@ from robosc.cli.arguments import (
     given_path,
     read_bundle,
 )
-from robosc.cli.explain_synthesis import add_question_arguments
+from robosc.cli.explain_synthesis import add_question_arguments, refuse_modular
 from robosc.cli.generate import add_initial_argument, refuse_initial
 from robosc.cli.output import CommandError, ExitCode, UsageError, print_json
 from robosc.cli.properties import add_arguments as add_property_arguments
 from robosc.cli.properties import property_file
 from robosc.cli.sign import read_supervisor
-from robosc.cli.synth import add_modular_argument, refuse_modular
+from robosc.cli.synth import add_modular_argument
+from robosc.cli.verify import add_automata_arguments
 from robosc.exploration import DEFAULT_LIMIT
 from robosc.model.structure import Deployment
 from robosc.pipeline.options import FOREIGN_STATES
@@ -101,6 +102,7 @@ def _add_tasks(submit: argparse.ArgumentParser) -> None:
             parser.add_argument("--target", required=True, metavar="NAME", help="target to generate: see 'targets'")
             parser.add_argument("--package", metavar="NAME", help="name of the generated package")
             add_initial_argument(parser)
+            add_modular_argument(parser)
         if name == "explore":
             _add_limit(parser, DEFAULT_LIMIT, "give up beyond N states")
         parser.add_argument("--label", type=_label, default="", metavar="TEXT", help="name of the job in lists")
@@ -143,6 +145,7 @@ def _add_verify_arguments(parser: argparse.ArgumentParser) -> None:
     )
     _add_limit(parser, FOREIGN_STATES, "verify up to N states of a supervisor file one by one")
     parser.add_argument("--strict", action="store_true", help="fail if maximal permissiveness could not be checked")
+    add_automata_arguments(parser)
     add_engine_options(parser)
     # A server has no keys to check a file with.
     parser.set_defaults(signed_by=[])
@@ -160,6 +163,8 @@ def _task(arguments: argparse.Namespace) -> Task | None:
     """Return the task to be done; None: it cannot be done, and the reason has been reported."""
     if arguments.task == "format":
         return Format(SourceFile(arguments.file.name, property_file(arguments.file).text))
+    if arguments.task == "explain-synthesis":
+        refuse_modular(arguments)
     if automata.is_given(arguments):
         return task_of(arguments, _generation(arguments).package if arguments.task == "generate" else None)
     if arguments.task == "verify":
@@ -169,11 +174,11 @@ def _task(arguments: argparse.Namespace) -> Task | None:
         case "check":
             return Check(bundle)
         case "synth":
-            refuse_modular(arguments)
-            return Synthesize(bundle, synthesis_options(arguments))
+            return Synthesize(bundle, synthesis_options(arguments), arguments.modular)
         case "generate":
             refuse_initial(arguments)
-            return Generate(bundle, arguments.target, _generation(arguments), synthesis_options(arguments))
+            options = synthesis_options(arguments)
+            return Generate(bundle, arguments.target, _generation(arguments), options, is_modular=arguments.modular)
         case "explain-synthesis":
             return Explain(
                 model=bundle,
@@ -181,6 +186,7 @@ def _task(arguments: argparse.Namespace) -> Task | None:
                 event=arguments.event,
                 state=arguments.state,
                 after=arguments.after,
+                is_modular=arguments.modular,
             )
         case _:
             return Explore(bundle, synthesis_options(arguments), arguments.limit)

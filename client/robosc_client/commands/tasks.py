@@ -178,7 +178,9 @@ def _check(arguments: argparse.Namespace, client: Client) -> int:
     def make(bundle: Bundle) -> "SynthesisOutcome":
         options = replace(synthesis_options(arguments), allow_livelock=False)
         with ProgressLine() as line:
-            found = client.synthesize(bundle, options, deadline_s=arguments.deadline, on_progress=line.report)
+            found = client.synthesize(
+                bundle, options, is_modular=arguments.modular, deadline_s=arguments.deadline, on_progress=line.report
+            )
         return outcome_from_response(found)
 
     return check_here.run_with(arguments, lambda bundle: client.check(bundle, deadline_s=arguments.deadline), make)
@@ -191,13 +193,14 @@ def _synth(arguments: argparse.Namespace, client: Client) -> int:
         raise UsageError("-o needs a file path")
     if automata.is_given(arguments):
         return automata.synth(arguments, Server(client, arguments.deadline, trusted_keys(arguments)))
-    synth.refuse_modular(arguments)
     require_other_file(arguments.output, arguments.model)
     keys = trusted_keys(arguments)
     bundle = read_bundle(arguments)
     options = synthesis_options(arguments)
     with ProgressLine() as line:
-        found = client.synthesize(bundle, options, deadline_s=arguments.deadline, on_progress=line.report)
+        found = client.synthesize(
+            bundle, options, is_modular=arguments.modular, deadline_s=arguments.deadline, on_progress=line.report
+        )
     made = outcome_from_response(found, found.supervisor)
     if made.supervisor is not None:
         require_made_for(made.supervisor, bundle, options.deployment)
@@ -223,6 +226,7 @@ def _generate(arguments: argparse.Namespace, client: Client) -> int:
             arguments.target,
             generation,
             synthesis_options(arguments),
+            is_modular=arguments.modular,
             deadline_s=arguments.deadline,
             on_progress=line.report,
         )
@@ -363,6 +367,7 @@ def _report_verdicts(
 
 
 def _explain_synthesis(arguments: argparse.Namespace, client: Client) -> int:
+    explain_here.refuse_modular(arguments)
     if automata.is_given(arguments):
         return automata.explain_synthesis(arguments, Server(client, arguments.deadline))
 
@@ -374,6 +379,7 @@ def _explain_synthesis(arguments: argparse.Namespace, client: Client) -> int:
                 event=arguments.event,
                 state=arguments.state,
                 after=arguments.after,
+                is_modular=arguments.modular,
                 deadline_s=arguments.deadline,
                 on_progress=line.report,
             )

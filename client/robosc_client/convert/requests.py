@@ -80,6 +80,7 @@ def _request(task: Task) -> Request:
                 target=task.target,
                 generation=_generate_options(task.generation),
                 initial=task.initial or "",
+                modular=task.is_modular,
             )
         case Explore():
             return pb.ExploreRequest(
@@ -96,6 +97,7 @@ def _request(task: Task) -> Request:
                 event=task.event,
                 state=task.state,
                 after=task.after,
+                modular=task.is_modular,
             )
         case Format():
             return pb.FormatRequest(file=_file(task.file))
@@ -159,6 +161,8 @@ def _verify_request(task: Verify) -> pb.VerifyRequest:
         property_files=map(_listing, task.property_files),
         maximum_states=_limit(task.maximum_states, "maximum_states"),
         strict=task.is_strict,
+        controller=task.controller,
+        as_is=task.as_is,
     )
 
 

@@ -352,18 +352,20 @@ class AddedCondition(_message.Message):
     def __init__(self, event: _Optional[str] = ..., condition: _Optional[str] = ...) -> None: ...
 
 class GenerateRequest(_message.Message):
-    __slots__ = ("bundle", "options", "target", "generation", "initial")
+    __slots__ = ("bundle", "options", "target", "generation", "initial", "modular")
     BUNDLE_FIELD_NUMBER: _ClassVar[int]
     OPTIONS_FIELD_NUMBER: _ClassVar[int]
     TARGET_FIELD_NUMBER: _ClassVar[int]
     GENERATION_FIELD_NUMBER: _ClassVar[int]
     INITIAL_FIELD_NUMBER: _ClassVar[int]
+    MODULAR_FIELD_NUMBER: _ClassVar[int]
     bundle: Bundle
     options: SynthesisOptions
     target: str
     generation: GenerateOptions
     initial: str
-    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., target: _Optional[str] = ..., generation: _Optional[_Union[GenerateOptions, _Mapping]] = ..., initial: _Optional[str] = ...) -> None: ...
+    modular: bool
+    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., target: _Optional[str] = ..., generation: _Optional[_Union[GenerateOptions, _Mapping]] = ..., initial: _Optional[str] = ..., modular: _Optional[bool] = ...) -> None: ...
 
 class GenerateOptions(_message.Message):
     __slots__ = ("package", "publish_state", "log_events", "supervised", "metadata", "state_message")
@@ -498,7 +500,7 @@ class ExplorationResult(_message.Message):
     def __init__(self, status: _Optional[_Union[SynthesisStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., reason: _Optional[str] = ..., explanation: _Optional[str] = ..., states: _Optional[int] = ..., transitions: _Optional[int] = ..., size: _Optional[int] = ..., digest: _Optional[bytes] = ..., goals: _Optional[_Union[GoalExplanation, _Mapping]] = ...) -> None: ...
 
 class VerifyRequest(_message.Message):
-    __slots__ = ("bundle", "options", "supervisor", "properties", "property_files", "maximum_states", "strict")
+    __slots__ = ("bundle", "options", "supervisor", "properties", "property_files", "maximum_states", "strict", "controller", "as_is")
     BUNDLE_FIELD_NUMBER: _ClassVar[int]
     OPTIONS_FIELD_NUMBER: _ClassVar[int]
     SUPERVISOR_FIELD_NUMBER: _ClassVar[int]
@@ -506,6 +508,8 @@ class VerifyRequest(_message.Message):
     PROPERTY_FILES_FIELD_NUMBER: _ClassVar[int]
     MAXIMUM_STATES_FIELD_NUMBER: _ClassVar[int]
     STRICT_FIELD_NUMBER: _ClassVar[int]
+    CONTROLLER_FIELD_NUMBER: _ClassVar[int]
+    AS_IS_FIELD_NUMBER: _ClassVar[int]
     bundle: Bundle
     options: SynthesisOptions
     supervisor: bytes
@@ -513,7 +517,9 @@ class VerifyRequest(_message.Message):
     property_files: _containers.RepeatedCompositeFieldContainer[SourceFile]
     maximum_states: int
     strict: bool
-    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., supervisor: _Optional[bytes] = ..., properties: _Optional[_Iterable[str]] = ..., property_files: _Optional[_Iterable[_Union[SourceFile, _Mapping]]] = ..., maximum_states: _Optional[int] = ..., strict: _Optional[bool] = ...) -> None: ...
+    controller: bool
+    as_is: bool
+    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., supervisor: _Optional[bytes] = ..., properties: _Optional[_Iterable[str]] = ..., property_files: _Optional[_Iterable[_Union[SourceFile, _Mapping]]] = ..., maximum_states: _Optional[int] = ..., strict: _Optional[bool] = ..., controller: _Optional[bool] = ..., as_is: _Optional[bool] = ...) -> None: ...
 
 class VerifyResponse(_message.Message):
     __slots__ = ("progress", "result")
@@ -536,18 +542,20 @@ class VerificationResult(_message.Message):
     def __init__(self, status: _Optional[_Union[VerificationStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., reason: _Optional[str] = ..., report: _Optional[str] = ...) -> None: ...
 
 class ExplainRequest(_message.Message):
-    __slots__ = ("bundle", "options", "event", "state", "after")
+    __slots__ = ("bundle", "options", "event", "state", "after", "modular")
     BUNDLE_FIELD_NUMBER: _ClassVar[int]
     OPTIONS_FIELD_NUMBER: _ClassVar[int]
     EVENT_FIELD_NUMBER: _ClassVar[int]
     STATE_FIELD_NUMBER: _ClassVar[int]
     AFTER_FIELD_NUMBER: _ClassVar[int]
+    MODULAR_FIELD_NUMBER: _ClassVar[int]
     bundle: Bundle
     options: SynthesisOptions
     event: str
     state: str
     after: str
-    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., event: _Optional[str] = ..., state: _Optional[str] = ..., after: _Optional[str] = ...) -> None: ...
+    modular: bool
+    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., event: _Optional[str] = ..., state: _Optional[str] = ..., after: _Optional[str] = ..., modular: _Optional[bool] = ...) -> None: ...
 
 class ExplainResponse(_message.Message):
     __slots__ = ("progress", "result")

@@ -1,6 +1,7 @@
-"""The reference implementation of `ControlledSystem`: it interprets a supervisor, and is simple rather than fast."""
+"""The reference implementation of `ControlledSystem`, rather simple than fast, and one for robots of many parts."""
 
 from robosc.execution.interpreter.description import describe
 from robosc.execution.interpreter.system import InterpretedSystem
+from robosc.execution.interpreter.watching import WatchingSystem
 
-__all__ = ["InterpretedSystem", "describe"]
+__all__ = ["InterpretedSystem", "WatchingSystem", "describe"]

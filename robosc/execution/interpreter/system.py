@@ -27,18 +27,29 @@ from robosc.supervisor import Supervisor
 
 
 @dataclass(frozen=True, slots=True)
-class _Successor:
+class Successor:
     """State that an event leads to.
 
     Attributes:
-        state: The new state.
+        before: The state before.
+        written: New value of each place that is written.
         skipped: Variables whose update was skipped.
         leaves_range: True if a synthesis variable would leave its range.
     """
 
-    state: dict[Place, Value]
+    before: Mapping[Place, Value]
+    written: dict[Place, Value]
     skipped: tuple[str, ...]
     leaves_range: bool
+
+    @property
+    def state(self) -> dict[Place, Value]:
+        """The new state."""
+        return {**self.before, **self.written}
+
+    def changed(self) -> list[Place]:
+        """Return the places that have another value in it."""
+        return [place for place, value in self.written.items() if self.before[place] != value]
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +119,7 @@ class InterpretedSystem:
         self._state = self._initial
         self.changes = 0
         self._request_events = tuple(info.name + ".request" for info in requesting(self.description.communications))
+        self._were_enabled: frozenset[int] = frozenset()
         self._batches = batches(self.description.communications)
         self._goals = None
         domains = place_domains(model)
@@ -119,6 +131,7 @@ class InterpretedSystem:
     def restart(self) -> None:
         """Return to the initial state."""
         self.changes += 1
+        self._were_enabled = frozenset()
         self._state = self._initial
         if self._goals is not None:
             self._goals.restart()
@@ -134,7 +147,7 @@ class InterpretedSystem:
         successor = self._successor(rule, no_data)
         if successor is None or successor.leaves_range:
             return False
-        return not is_tau(event) or successor.state != state
+        return not is_tau(event) or bool(successor.changed())
 
     def is_possible(self, event: str) -> bool:
         """Return True if the plants allow an event now, for any data; an unknown event is a KeyError."""
@@ -156,6 +169,11 @@ class InterpretedSystem:
     def enabled_requests(self) -> tuple[int, ...]:
         """Return the numbers, in source order of all requests, of those that are allowed now."""
         return tuple(number for number, event in enumerate(self._request_events) if self.enabled(event))
+
+    def changed_requests(self) -> tuple[int, ...]:
+        """Return the numbers of the requests that are allowed now and were not at the last call, or vice versa."""
+        before, self._were_enabled = self._were_enabled, frozenset(self.enabled_requests())
+        return tuple(sorted(before ^ self._were_enabled))
 
     def enabled_silent(self) -> str | None:
         """The first reset, then the first tau, that is allowed now; None if none is."""
@@ -184,9 +202,7 @@ class InterpretedSystem:
         successor = self._successor(rule, no_data if reading is None else reading.values.get)
         if successor is None or (rule.is_controllable and successor.leaves_range):
             return None
-        if successor.state != self._state:
-            self.changes += 1
-        self._state = successor.state
+        self._enter(successor)
         return successor.skipped
 
     def provide(self, communication: str) -> tuple[bool, Any]:
@@ -284,10 +300,18 @@ class InterpretedSystem:
         """Return a hashable value that differs between states."""
         return tuple(self._state.values())
 
-    def _successor(self, rule: EventRule, data: Data) -> _Successor | None:
+    def _enter(self, successor: Successor) -> None:
+        """Go over to the state that an event leads to."""
+        if successor.changed():
+            self.changes += 1
+        # The new one of equal numbers counts, too, such as -0.0 after 0.0.
+        if successor.written:
+            self._state = successor.state
+
+    def _successor(self, rule: EventRule, data: Data) -> Successor | None:
         """Return the successor that an event leads to by the plants alone; None if one of them blocks it."""
         old = self._state
-        new = dict(old)
+        new: dict[Place, Value] = {}
         skipped: list[str] = []
         leaves_range = False
         if rule.plant is not None:
@@ -312,7 +336,7 @@ class InterpretedSystem:
                     skipped.append(f"{participant.name}.{update.variable.name}")
                 else:
                     new[update.place] = assigned
-        return _Successor(new, tuple(skipped), leaves_range)
+        return Successor(old, new, tuple(skipped), leaves_range)
 
     def _chosen(self, participant: Participant) -> TransitionRule | None:
         """The transition that a component takes from its current state."""

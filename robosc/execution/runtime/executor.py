@@ -75,7 +75,7 @@ class Executor(Runner):
                 self._check_time(now)
             if self._may_request:
                 if self._decisions.decide(now):
-                    self._deadline_s = self._next_deadline(now)
+                    self._wake_at(self._replies.deadline_s())
             else:
                 self._safe_stop.retry()
         except Exception as error:
@@ -83,14 +83,14 @@ class Executor(Runner):
 
     def _begin(self) -> None:
         if isinstance(self._decisions, PolicyDecisions):
-            self._decisions.policy = self._new_policy()
+            self._decisions.begin(self._new_policy())
         super()._begin()
 
     def _end_batch(self) -> None:
         """Silent steps, and a decision if each batch brings one."""
         self._steps.settle()
         if self._decides_after_batch and self._may_request and self._decisions.decide(self._now_s):
-            self._deadline_s = self._next_deadline(self._now_s)
+            self._wake_at(self._replies.deadline_s())
 
     def _new_policy(self) -> Policy:
         settings = self.settings

@@ -212,6 +212,14 @@ class ControlledSystem(Protocol):
         All requests are numbered from 0 in source order.
         """
 
+    def changed_requests(self) -> Sequence[int]:
+        """
+        Return the numbers of the requests that are allowed now and were not before, or vice versa.
+
+        That is since the last call; the first time, and after `restart`, those that are allowed.
+        An executor calls it in each stable state, so it takes no longer than what has changed.
+        """
+
     def enabled_silent(self) -> Optional[str]:
         """
         Return the silent step that is allowed now, or None if none is.

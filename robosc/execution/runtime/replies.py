@@ -130,7 +130,7 @@ class Replies:
             return False
         self._goals.close(goal_id)
         # Its action may be requested again.
-        self._steps.candidates = None
+        self._steps.is_decided = False
         if goal.is_running and outcome == 'succeeded':
             self._steps.happen_with_data(goal.action + '.response', data)
         elif goal.is_running and outcome == 'cancelled':

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Dict, NamedTuple, Optional, Sequence, Tuple
+from typing import Collection, Dict, NamedTuple, Optional, Sequence, Set, Tuple
 
 from robosc.execution.runtime.calls import Calls, Goals
 from robosc.execution.runtime.decision import Policy
@@ -119,29 +119,6 @@ class Decisions:
         self._calls = calls
         self._goals = goals
 
-    def _find_enabled(self) -> Tuple[int, ...]:
-        """
-        Return the numbers of the requests that may be issued.
-
-        An action whose old goal may still be under way is left out.
-        """
-        enabled, goals = self._system.enabled_requests(), self._goals
-        if not goals:
-            return enabled
-        return tuple(
-            [number for number in enabled if not goals.is_open(self._requests[number].name)]
-        )
-
-    def _split(self, enabled: Tuple[int, ...]) -> Tuple[Tuple[int, ...], Tuple[int, ...]]:
-        """Return the requests whose message would end a release that waits, and the others."""
-        names = {
-            name
-            for identifier in self._releases.waiting
-            for name in self._releases.alternatives(identifier)
-        }
-        ending = tuple([number for number in enabled if self._requests[number].name in names])
-        return ending, tuple([number for number in enabled if number not in ending])
-
     def _issue(self, request: Request, now_s: float) -> bool:
         """Issue a request; return False if its data is unknown or does not fit."""
         name, event, identifier, kind, keeps_acting, has_limits = request
@@ -200,15 +177,18 @@ class Decisions:
 
 
 class PolicyDecisions(Decisions):
-    """
-    Decisions by a policy that chooses among the enabled requests.
+    """Decisions by a policy that chooses among the enabled requests."""
 
-    :ivar policy: The policy; may be replaced.
-    """
-
-    __slots__ = ('policy',)
+    __slots__ = ('_allowed', '_numbers', '_open', 'policy')
 
     policy: Policy
+
+    def begin(self, policy: Policy) -> None:
+        """Begin with a policy that has no past, before the first decision in the initial state."""
+        self.policy = policy
+        self._allowed: Set[int] = set()
+        self._open: Set[int] = set()
+        self._numbers = {request.name: number for number, request in enumerate(self._requests)}
 
     def decide(self, now_s: float) -> bool:
         """
@@ -217,32 +197,61 @@ class PolicyDecisions(Decisions):
         :returns: True if a service was called or a goal was sent, so that something new waits for
             time to pass.
         """
-        enabled = self._steps.candidates
-        if enabled is None:
-            enabled = self._steps.candidates = self._find_enabled()
+        if not self._steps.is_decided:
+            self._take_changes()
+            self._steps.is_decided = True
         issued = None
-        if enabled:
-            if self._releases.waiting:
-                ending, others = self._split(enabled)
-                issued = self._issue_one_of(ending, now_s)
-                if issued is None:
-                    issued = self._issue_one_of(others, now_s)
-            else:
-                issued = self._issue_one_of(enabled, now_s)
-        self.policy.close(enabled)
+        if self._releases.waiting:
+            issued = self._issue_one_of(self._ending(), now_s)
+        if issued is None:
+            issued = self._issue_one_of(None, now_s)
+        self.policy.close()
         return issued is not None and issued.kind != _MESSAGE
 
-    def _issue_one_of(self, candidates: Tuple[int, ...], now_s: float) -> Optional[Request]:
+    def _take_changes(self) -> None:
+        """
+        Tell the policy which requests have become enabled or disabled.
+
+        An action whose old goal may still be under way is left out.
+        """
+        allowed, policy = self._allowed, self.policy
+        changed: Collection[int] = self._system.changed_requests()
+        allowed.symmetric_difference_update(changed)
+        if self._goals or self._open:
+            are_open = {self._numbers[goal.action] for goal in self._goals.open_goals()}
+            changed = {*changed, *(are_open ^ self._open)}
+            self._open = are_open
+        for number in changed:
+            if number in allowed and number not in self._open:
+                policy.enable(number)
+            else:
+                policy.disable(number)
+
+    def _ending(self) -> Tuple[int, ...]:
+        """Return the enabled requests whose message would end a release that waits."""
+        return tuple(
+            sorted(
+                self._numbers[name]
+                for identifier in self._releases.waiting
+                for name in self._releases.alternatives(identifier)
+                if self._numbers[name] in self.policy.enabled
+            )
+        )
+
+    def _issue_one_of(self, among: Optional[Tuple[int, ...]], now_s: float) -> Optional[Request]:
         """Issue and return the policy's choice, or the next if its data is not known or unfit."""
         policy = self.policy
-        while candidates:
-            chosen = policy.choose(candidates)
+        while True:
+            chosen = policy.choose(among)
+            if chosen is None:
+                return None
             request = self._requests[chosen]
             if self._issue(request, now_s):
                 policy.issued(chosen)
                 return request
-            candidates = tuple([number for number in candidates if number != chosen])
-        return None
+            policy.withhold(chosen)
+            if among is not None:
+                among = tuple([number for number in among if number != chosen])
 
 
 class StrategyDecisions(Decisions):
@@ -252,9 +261,10 @@ class StrategyDecisions(Decisions):
     :ivar progress: Account of the strategy's progress, which asks the strategy.
     """
 
-    __slots__ = ('progress',)
+    __slots__ = ('_chosen', 'progress')
 
     progress: ProgressAccount
+    _chosen: Optional[int]
 
     def decide(self, now_s: float) -> bool:
         """
@@ -263,38 +273,47 @@ class StrategyDecisions(Decisions):
         :returns: True if a service was called or a goal was sent, so that something new waits for
             time to pass.
         """
-        candidates = self._steps.candidates
-        if candidates is None:
-            candidates = self._steps.candidates = self._find_chosen()
+        if not self._steps.is_decided:
+            self._chosen = self._find_chosen()
+            self._steps.is_decided = True
+        chosen = self._chosen
         if self._releases.waiting:
-            ending, others = self._split(candidates)
-            if ending and self._issue(self._requests[ending[0]], now_s):
-                return False
+            if chosen is not None and self._ends_release(chosen):
+                if self._issue(self._requests[chosen], now_s):
+                    return False
+                chosen = None
             # The strategy chooses something else, or nothing: then no message comes that the
             # releases wait for.
             self._release_waiting()
-            candidates = others
-        if not candidates:
+        if chosen is None:
             return False
-        request = self._requests[candidates[0]]
+        request = self._requests[chosen]
         return self._issue(request, now_s) and request.kind != _MESSAGE
 
-    def _find_chosen(self) -> Tuple[int, ...]:
+    def _find_chosen(self) -> Optional[int]:
         """
-        Return the number of the chosen request alone, or nothing.
+        Return the number of the chosen request, if it may be issued.
 
         An action whose cancelled goal is not known to have ended is waited for. A strategy is
         asked also where it has nothing to choose: it notes the goals that are true.
         """
         chosen = self.progress.decide()
         if chosen is None:
-            return ()
+            return None
         request = self._requests[chosen]
         if not self._system.enabled(request.event):
-            return ()
+            return None
         if request.kind == _ACTION and self._goals.is_open(request.name):
-            return ()
-        return (chosen,)
+            return None
+        return chosen
+
+    def _ends_release(self, chosen: int) -> bool:
+        """Return True if the message of a request would end a release that waits."""
+        name = self._requests[chosen].name
+        return any(
+            name in self._releases.alternatives(identifier)
+            for identifier in self._releases.waiting
+        )
 
     def _release_waiting(self) -> None:
         """Release what waits for a message that does not come."""

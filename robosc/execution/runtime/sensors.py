@@ -15,17 +15,15 @@ class _Sensor:
     :ivar max_age_s: Seconds after which it is stale.
     :ivar seen_s: Time when it came last, in seconds; before the first time, when the executor
         started.
-    :ivar was_seen: True if it came since the start.
     """
 
-    __slots__ = ('identifier', 'max_age_s', 'name', 'seen_s', 'was_seen')
+    __slots__ = ('identifier', 'max_age_s', 'name', 'seen_s')
 
     def __init__(self, name: str, identifier: str, max_age_s: float) -> None:
         self.name = name
         self.identifier = identifier
         self.max_age_s = max_age_s
         self.seen_s = 0.0
-        self.was_seen = False
 
 
 class Sensors:
@@ -37,7 +35,7 @@ class Sensors:
     :param max_age_s: Maximum age by identifier, from the deployment: it overrides the model's.
     """
 
-    __slots__ = ('_sensors',)
+    __slots__ = ('_sensors', '_unseen')
 
     def __init__(
         self, messages: Sequence[Tuple[str, str, Optional[float]]], max_age_s: Mapping[str, float]
@@ -51,6 +49,8 @@ class Sensors:
             for name, identifier, age in ages
             if age is not None
         }
+        # Those that have not come since the start, in source order.
+        self._unseen = dict(self._sensors)
 
     def __bool__(self) -> bool:
         return bool(self._sensors)
@@ -59,7 +59,7 @@ class Sensors:
         """Start anew: no message has been seen."""
         for sensor in self._sensors.values():
             sensor.seen_s = now_s
-            sensor.was_seen = False
+        self._unseen = dict(self._sensors)
 
     def see(self, name: str, now_s: float) -> bool:
         """Take in a message; return True if it is one that is watched."""
@@ -67,18 +67,16 @@ class Sensors:
         if sensor is None:
             return False
         sensor.seen_s = now_s
-        sensor.was_seen = True
+        self._unseen.pop(name, None)
         return True
 
     def are_all_seen(self) -> bool:
         """Return True if every sensor has sent at least one message."""
-        return all(sensor.was_seen for sensor in self._sensors.values())
+        return not self._unseen
 
     def unseen(self) -> Tuple[str, ...]:
         """Return identifiers of the sensors without a message since the start, each once."""
-        return tuple(
-            dict.fromkeys(item.identifier for item in self._sensors.values() if not item.was_seen)
-        )
+        return tuple(dict.fromkeys(item.identifier for item in self._unseen.values()))
 
     def stale(self, now_s: float) -> List[Tuple[str, str]]:
         """Name and identifier of the messages whose maximum age has passed."""

@@ -35,8 +35,7 @@ class Steps:
     :param cancels: Cancels of these goals.
     :param on_unknown: Meaning of an unknown enum: `default`, `keep` or `fault`.
     :param progress: Account of the strategy's progress; None where there is no strategy.
-    :ivar candidates: Numbers of the requests that may be issued in the stable state, or None
-        before they are computed.
+    :ivar is_decided: True if all that a decision depends on is known in this stable state.
     :ivar unchanging: Messages whose request was issued in this stable state and changed nothing:
         their data, whether it is the default, and what of it limits moved. A request's data and
         its step depend only on the state.
@@ -53,7 +52,7 @@ class Steps:
         '_releases',
         '_stable',
         '_system',
-        'candidates',
+        'is_decided',
         'unchanging',
     )
 
@@ -76,7 +75,7 @@ class Steps:
         self._cancels = cancels
         self._on_unknown = on_unknown
         self._progress = progress
-        self.candidates: Optional[Tuple[int, ...]] = None
+        self.is_decided = False
         self.unchanging: Dict[str, Tuple[Any, bool, Tuple[str, ...]]] = {}
         # The system's `changes` in the last stable state, or None if the state may not be stable.
         self._stable: Optional[int] = None
@@ -89,7 +88,7 @@ class Steps:
         if self._progress is not None:
             self._progress.restart()
         self._stable = None
-        self.candidates = None
+        self.is_decided = False
         self.unchanging.clear()
         self._pending = None
 
@@ -205,7 +204,7 @@ class Steps:
         if has_changed:
             # Should anything raise on the way, the state does not count as stable.
             self._stable = None
-            self.candidates = None
+            self.is_decided = False
             self.unchanging.clear()
             event = self._silent_step()
             if event is not None:

@@ -15,6 +15,7 @@ from robosc.expressions import (
     Type,
     Value,
 )
+from robosc.expressions.text import cif_text
 from robosc.model.received import Path
 from robosc.model.structure import Model
 from robosc.targets.code.automata import AutomataWriter, ControlledAutomata, always
@@ -220,7 +221,7 @@ class _Diagrams(CDiagrams):
     uses: dict[str, set[str]]
 
     def __init__(self, system: System, scope: CWriter) -> None:
-        super().__init__(system, scope, frozenset())
+        super().__init__(system, scope, cif_text)
         self.uses = {}
 
     def _definition(self, name: str, head: str, body: Block) -> list[str]:

@@ -5,19 +5,20 @@ the group or automaton `hall.door`. An automaton with one event of its own name 
 """
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 
 from robosc._version import __version__
 from robosc.automata.state import Subject, subject_type
-from robosc.automata.structure import Automaton, DiscreteVariable, Edge, Role, System
+from robosc.automata.structure import Assignment, Automaton, DiscreteVariable, Edge, Role, System
 from robosc.cif.terms import result_range
 from robosc.cif.typing import NAMELESS
 from robosc.conditions.formula import to_expression
 from robosc.conditions.literals import membership, merged
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import (
+    MAXIMUM_INTEGER,
     MINIMUM_INTEGER,
     TRUE,
     Binary,
@@ -220,7 +221,10 @@ class _Writer:
             case Unary(operand=operand):
                 low, high = self._bounds(operand)
                 return -high, -low
-            case Conditional(then=then, otherwise=otherwise):
+            case Conditional(condition=condition, then=then, otherwise=otherwise):
+                # A value that is never chosen is not written.
+                if (found := self._text(condition, ())) in (text.TRUE, text.FALSE):
+                    return self._bounds(then if found == text.TRUE else otherwise)
                 (a, b), (c, d) = self._bounds(then), self._bounds(otherwise)
                 return min(a, c), max(b, d)
             case Call(function=function, arguments=arguments):
@@ -282,7 +286,8 @@ class _Writer:
             name = "location" if location == NAMELESS else f"location {escaped(location)}"
             inside = ["initial;"] if location in automaton.initial else []
             inside += ["marked;"] if location in automaton.marked else []
-            inside += self._edges([edge for edge in automaton.edges if edge.source == location], path)
+            edges = [edge for edge in automaton.edges if edge.source == location]
+            inside += self._edges(edges, {item.name: item.type for item in automaton.variables}, path)
             yield f"{name}{':' if inside else ';'}"
             yield from (f"  {line}" for line in inside)
 
@@ -297,7 +302,7 @@ class _Writer:
             begins = "in any" if len(values) == len(domain(item.type)) else f"in {{{', '.join(values)}}}"
         return f"disc {self._type(item.type, scope)} {escaped(_checked(item.name))} {begins};"
 
-    def _edges(self, edges: Iterable[Edge], scope: _Path) -> Iterator[str]:
+    def _edges(self, edges: Iterable[Edge], types: Mapping[str, Type], scope: _Path) -> Iterator[str]:
         def what(edge: Edge) -> tuple[object, ...]:
             return edge.guard, edge.updates, edge.target
 
@@ -309,9 +314,20 @@ class _Writer:
                 line += f" when {self._text(edge.guard, scope)}"
             if edge.updates:
                 line += " do " + ", ".join(
-                    f"{escaped(item.variable)} := {self._text(item.expression, scope)}" for item in edge.updates
+                    f"{escaped(item.variable)} := {self._assigned(item, types[item.variable], scope)}"
+                    for item in edge.updates
                 )
             yield line + (f" goto {escaped(edge.target)};" if edge.target != edge.source else ";")
+
+    def _assigned(self, update: Assignment, type_: Type, scope: _Path) -> Text:
+        """The new value of a variable; CIF takes none of which it knows that it is always out of range."""
+        value = self._text(update.expression, scope)
+        if isinstance(type_, IntegerType):
+            least, greatest = self._bounds(update.expression)
+            low, high = int(type_.low or 0), int(type_.high or 0)
+            if greatest < low or least > high:
+                return Text(f"if true: {value} else {low} end")
+        return value
 
     # The supervisor
 
@@ -342,14 +358,37 @@ class _Writer:
                 for update in edge.updates if edge.event == event else ():
                     match types[update.variable]:
                         case IntegerType(low=int(low), high=int(high)):
-                            least, greatest = self._bounds(update.expression)
-                            new = self._text(update.expression, scope).within(Level.SUM)
-                            stays = [compared(str(_integer(low)), "<=", new)] if least < low else []
-                            stays += [compared(new, "<=", str(_integer(high)))] if greatest > high else []
+                            stays = list(self._stays(update.expression, low, high))
                             here = self._text(StateTest(automaton.name, edge.source), scope)
                             if len(automaton.locations) == 1:
                                 here = text.TRUE
                             yield implied(all_of([here, self._text(edge.guard, scope)]), all_of(stays))
+
+    def _stays(self, expression: Expression, low: int, high: int) -> Iterator[Text]:
+        """Yield the conditions that a value is in a range, as far as it need not be."""
+        scope = (self._supervisor,)
+        least, greatest = self._bounds(expression)
+        match expression:
+            case Binary(operator="-", left=left, right=right) if (
+                low >= 0 and self._bounds(right)[1] + high <= MAXIMUM_INTEGER
+            ):
+                # In conditions, tools of CIF take sums and no differences.
+                whole = self._text(left, scope).within(Level.SUM)
+                if least < low:
+                    yield compared(self._plus(right, low).within(Level.SUM), "<=", whole)
+                if greatest > high:
+                    yield compared(whole, "<=", self._plus(right, high).within(Level.SUM))
+            case _:
+                new = self._text(expression, scope).within(Level.SUM)
+                if least < low:
+                    yield compared(str(_integer(low)), "<=", new)
+                if greatest > high:
+                    yield compared(new, "<=", str(_integer(high)))
+
+    def _plus(self, expression: Expression, number: int) -> Text:
+        if isinstance(expression, Constant) and isinstance(expression.value, int):
+            return _integer(expression.value + number)
+        return self._text(Binary("+", expression, Constant(number)) if number else expression, (self._supervisor,))
 
     def _condition(self, diagram: DecisionDiagram | None) -> Text:
         """A condition as a formula, or by algebraic variables that stand for the nodes of its diagram."""

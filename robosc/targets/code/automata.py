@@ -19,7 +19,7 @@ from robosc.automata.structure import Automaton, Edge, Event, InputVariable, Sys
 from robosc.cif.typing import NAMELESS
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import ITSELF, TRUE, Binary, EnumType, Expression, IntegerType, Type, Value, conjuncts
-from robosc.expressions.text import expression_text
+from robosc.expressions.text import cif_text
 from robosc.supervisor import DecisionDiagram
 from robosc.supervisor.predicates import state_predicate
 from robosc.synthesis import edge_choices
@@ -190,21 +190,21 @@ class AutomataWriter(ABC):
         if event.is_controllable:
             conditions += [item.condition for item in self._system.conditions if item.event == event.name]
         for condition in conditions:
-            found += self._required(expression_text(condition), self._before.truth(condition))
+            found += self._required(cif_text(condition), self._before.truth(condition))
         if event.name in self._automata.added:
             found += self._required(*self._diagrams.added(self._automata.added[event.name]))
         for automaton in self._system.automata:
             if event.name in automaton.alphabet:
                 found += self._part(automaton, event)
         for condition in plant_invariants_on(self._system, event.name):
-            found += self._required(f"afterwards {expression_text(condition)}", self._after.truth(condition))
+            found += self._required(f"afterwards {cif_text(condition)}", self._after.truth(condition))
         return [*found, Return(TRUE_CODE)]
 
     def may_begin(self) -> Block:
         """The statements that say whether the system may begin in a state."""
         found: list[Statement] = []
         for condition in self._automata.initial_conditions:
-            found += self._required(expression_text(condition), self._before.truth(condition))
+            found += self._required(cif_text(condition), self._before.truth(condition))
         if self._automata.initial is not None:
             found += self._required(*self._diagrams.added(self._automata.initial))
         return [*found, Return(TRUE_CODE)]
@@ -218,7 +218,7 @@ class AutomataWriter(ABC):
                 is_in = self._before.in_one_of(automaton.name, marked) if marked else FALSE_CODE
                 found += self._required(automaton.name, is_in)
         marker = self._system.marker
-        return [*found, *self._required(expression_text(marker), self._before.truth(marker)), Return(TRUE_CODE)]
+        return [*found, *self._required(cif_text(marker), self._before.truth(marker)), Return(TRUE_CODE)]
 
     def begin(self, constant: Callable[[Type, Value], Code]) -> Block:
         """The assignments of the first state, but for input variables.
@@ -282,7 +282,7 @@ class AutomataWriter(ABC):
         for update in edge.updates:
             type_ = subject_type(self._system, Subject(automaton.name, update.variable))
             place = f": {update.variable}" if update.variable != ITSELF else ""
-            words = f"{automaton.name}{place} := {expression_text(update.expression)}"
+            words = f"{automaton.name}{place} := {cif_text(update.expression)}"
             value = self._before.value(update.expression)
             _require_native(words, value)
             if isinstance(type_, IntegerType):

@@ -1,12 +1,13 @@
 """Conditions that allow a controllable event as code: those of the model, and those that the supervisor adds."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection
+from collections.abc import Callable
+from functools import partial
 
 from robosc.automata import System
 from robosc.automata.executable import ExecutableEvent
 from robosc.conditions.rendering import Formulas, in_words, size_in_words
-from robosc.expressions import conjuncts
+from robosc.expressions import Expression, conjuncts
 from robosc.expressions.text import variable_text
 from robosc.supervisor import DecisionDiagram, DecisionNode, Supervisor
 from robosc.supervisor.diagram import diagram_domains
@@ -32,15 +33,15 @@ class Diagrams(ABC):
     Args:
         system: The automata, for the domains of the diagrams.
         scope: Writes expressions over the state.
-        names: Names that are kept whole in words.
+        text: Function that writes a condition in words.
 
     Attributes:
         nodes: Lines of each node's function so far, by its name.
     """
 
-    def __init__(self, system: System, scope: ExpressionWriter, names: Collection[str]) -> None:
+    def __init__(self, system: System, scope: ExpressionWriter, text: Callable[[Expression], str]) -> None:
         self._scope = scope
-        self._names = names
+        self._text = text
         self._formulas = Formulas(diagram_domains(system))
         self._numbers: dict[tuple[object, ...], int] = {}
         self.nodes: dict[str, list[str]] = {}
@@ -66,7 +67,7 @@ class Diagrams(ABC):
         """Return a condition over the state with its formula, or with its size where that is not short."""
         expression = self._formulas.formula(diagram)
         if expression is not None:
-            return in_words(expression, self._names), self._scope.truth(expression)
+            return self._text(expression), self._scope.truth(expression)
         codes = [FALSE_CODE, TRUE_CODE]
         for node in diagram.nodes:
             codes.append(self._node(node, tuple(codes[child] for child in node.children)))
@@ -97,7 +98,8 @@ class Conditions(Diagrams):
     """
 
     def __init__(self, supervisor: Supervisor, system: System, scope: ExpressionWriter) -> None:
-        super().__init__(system, scope, frozenset(item.name for item in supervisor.model.components))
+        components = frozenset(item.name for item in supervisor.model.components)
+        super().__init__(system, scope, partial(in_words, components=components))
         self._supervisor = supervisor
 
     def enabling(self, event: str) -> list[Condition]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from robosc._version import __version__
 from robosc.automata.structure import Event, System
 from robosc.expressions import EnumType, IntegerType, Type
+from robosc.expressions.text import cif_text
 from robosc.model.received import Path
 from robosc.model.structure import Model
 from robosc.targets.code.automata import AutomataWriter, ControlledAutomata, always
@@ -51,7 +52,7 @@ class _Diagrams(PythonDiagrams):
     """Writes decision diagrams; each function is noted with what it calls."""
 
     def __init__(self, system: System, scope: Scope) -> None:
-        super().__init__(system, scope, frozenset())
+        super().__init__(system, scope, cif_text)
 
     def _node_call(self, number: int) -> Code:
         return call(f"_node_{number}", variable("s"))

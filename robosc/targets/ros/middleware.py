@@ -180,12 +180,28 @@ def _python_files(supervisor: Supervisor, package: str, middleware: Middleware) 
     return files
 
 
+_LONG = 10_000
+"""Characters from which a literal is written on several lines."""
+
+
+def _literal(value: object, indent: str = "") -> str:
+    """A value in Python; a long one with an item on each line: the tokenizer of Python is slow with very long lines."""
+    text = ascii(value)
+    within = f"{indent}    "
+    if len(text) < _LONG or not isinstance(value, dict | list):
+        return text
+    if isinstance(value, dict):
+        items = [f"{within}{key!a}: {_literal(item, within)},\n" for key, item in value.items()]
+        return "{\n" + "".join(items) + indent + "}"
+    return "[\n" + "".join(f"{within}{_literal(item, within)},\n" for item in value) + indent + "]"
+
+
 @cache
 def _environment(package: str) -> jinja2.Environment:
     """Templates of a middleware's packages, and those that all of them share."""
     filters: dict[str, Callable[..., object]] = {
         "callers": partial(callers_name, ""),
-        "literal": ascii,
+        "literal": _literal,
         "names": lambda communications: tuple(item.name for item in communications),
         "robots": partial(robots_name, ""),
     }

@@ -62,10 +62,11 @@ class _Check:
         self._invariant = relations.holds(system.invariants)
         self._relations = [relations.relation(event) for event in system.events]
         self._reachability = Reachability(self._variables, self._relations)
-        self._initial = self._variables.initial() & relations.holds([system.initial, *system.plant_invariants])
+        begins = [*self._variables.initial(), relations.holds([system.initial, *system.plant_invariants])]
         if initial is not None:
-            self._initial = self._initial & self._variables.decision(initial)
-        self._marked = self._variables.marked() & relations.holds([system.marker])
+            begins.append(self._variables.decision(initial))
+        self._initial = self._variables.all_of(begins)
+        self._marked = self._variables.all_of([*self._variables.marked(), relations.holds([system.marker])])
         self._reachable = self._reachability.reachable(self._initial)
 
     def verification(self) -> Verification:
@@ -95,7 +96,7 @@ class _Check:
         """A reachable state where the supervisor stands in the way of an uncontrollable event."""
         for relation in self._relations:
             if not relation.event.is_controllable:
-                disabled = self._reachable & relation.enabled & ~relation.allowed
+                disabled = self._reachable & (relation.enabled & ~relation.allowed)
                 found = self._failure("controllable", disabled, f"the uncontrollable {relation.event.name} is disabled")
                 if found is not None:
                     return found

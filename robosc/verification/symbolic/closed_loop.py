@@ -130,7 +130,8 @@ class ClosedLoop:
         self.assumptions = tuple(relations.truth(item) for item in owed.assumptions)
         self.reached = [false] * len(modes)
         self._growth: list[_Growth] = []
-        self._start = self.variables.initial() & relations.holds([system.initial, *system.plant_invariants])
+        begins = relations.holds([system.initial, *system.plant_invariants])
+        self._start = self.variables.all_of([*self.variables.initial(), begins])
 
     def _message(self, relation_of: Callable[[Occurrence], Relation], message: Message) -> Move:
         parts: list[Part] = []

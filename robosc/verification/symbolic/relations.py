@@ -8,7 +8,7 @@ from robosc.automata.compile import Carried
 from robosc.automata.decision import Decision
 from robosc.automata.semantics import plant_invariants_on
 from robosc.automata.state import Subject, subject_type
-from robosc.automata.structure import Assignment, Automaton, Edge, Event, EventCondition, Role
+from robosc.automata.structure import Assignment, Automaton, Edge, Event, Role
 from robosc.expressions import BooleanType, Expression, IntegerType, Value
 from robosc.verification.symbolic.expressions import Expressions
 from robosc.verification.symbolic.linear import Cases
@@ -44,22 +44,21 @@ class Relation:
 
     def image(self, variables: Variables, states: Any) -> Any:
         """Return the states that the event leads to from some states."""
-        manager = variables.manager
-        found = states & self.guard & self.steps
-        if self.names:
-            found = manager.let({after(name): name for name in self.names}, manager.exist(self.names, found))
-        return variables.work.count(found)
+        return variables.work.count(self.successors(variables, states))
 
     def preimage(self, variables: Variables, states: Any) -> Any:
         """From where the event can lead to some states."""
-        manager = variables.manager
-        found = self.steps
-        if self.names:
-            found = found & manager.let({name: after(name) for name in self.names}, states)
-            found = manager.exist([after(name) for name in self.names], found)
-        else:
-            found = found & states
-        return variables.work.count(found & self.guard)
+        return variables.work.count(self.predecessors(variables, states))
+
+    def successors(self, variables: Variables, states: Any) -> Any:
+        """Return the states that the event leads to from some states; the work is not counted."""
+        found = variables.without(self.names, states & self.guard & self.steps)
+        return variables.renamed({after(name): name for name in self.names}, found)
+
+    def predecessors(self, variables: Variables, states: Any) -> Any:
+        """From where the event can lead to some states; the work is not counted."""
+        found = self.steps & variables.renamed({name: after(name) for name in self.names}, states)
+        return self.guard & variables.without([after(name) for name in self.names], found)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +85,15 @@ class Relations:
         self._variables = variables
         self._added = added
         self._plain = Expressions(variables)
+        system = variables.system
+        self._automata = _by_event((event, item) for item in system.automata for event in item.alphabet)
+        self._conditions = _by_event((item.event, item.condition) for item in system.conditions)
+        self._plant_conditions = _by_event((item.event, item.condition) for item in system.plant_conditions)
+        self._data = _by_event(
+            (event, name)
+            for (event, _), digits in variables.data.items()
+            for name in (*digits.names, *([] if digits.known is None else [digits.known]))
+        )
 
     def holds(self, conditions: Iterable[Expression]) -> Any:
         """Return the predicate that conditions are all true."""
@@ -103,37 +111,32 @@ class Relations:
             options: Data that it can carry, each as the values of some paths, None where one is unknown; None: any.
         """
         variables, manager = self._variables, self._variables.manager
-        automata = [item for item in variables.system.automata if event.name in item.alphabet]
+        automata = self._automata.get(event.name, [])
         places = sorted(place for item in automata for place in self._changed(item, event.name))
         plants = [self._part(item, event.name, set(places)) for item in automata if item.role is Role.PLANT]
         watching = [self._part(item, event.name, set(places)) for item in automata if item.role is Role.REQUIREMENT]
         parts = [*plants, *watching]
-        able = self._conditions(event, variables.system.plant_conditions) if automata else manager.false
+        able = self.holds(self._plant_conditions.get(event.name, ())) if automata else manager.false
         possible = variables.all_of([able, *(part.possible for part in plants)])
         data = variables.possible_data(event.name)
         if options is not None:
             data = data & variables.any_of(variables.carried(event.name, item) for item in options)
-        names_of_data = [
-            name
-            for (owner, _), digits in variables.data.items()
-            if owner == event.name
-            for name in (*digits.names, *([] if digits.known is None else [digits.known]))
-        ]
+        names_of_data = self._data.get(event.name, [])
         leaving = variables.any_of(part.leaves_range for part in parts) & data
         steps = data & able
         for part in parts:
             steps = variables.work.count(steps & part.steps)
         if names_of_data:
-            leaving, steps = manager.exist(names_of_data, leaving), manager.exist(names_of_data, steps)
+            leaving, steps = variables.without(names_of_data, leaving), variables.without(names_of_data, steps)
         leaving = possible & leaving
         names = tuple(name for place in places for name in variables.places[place].names)
         if lasting := plant_invariants_on(variables.system, event.name):
-            kept = manager.let({name: after(name) for name in names}, self.holds(lasting))
+            kept = variables.renamed({name: after(name) for name in names}, self.holds(lasting))
             steps = variables.work.count(steps & kept)
-            possible = possible & (leaving | manager.exist([after(name) for name in names], steps))
+            possible = possible & (leaving | variables.without([after(name) for name in names], steps))
         # A requirement that has no edge for the event is against it, and stays as it is.
         conditions = variables.all_of(
-            [self._conditions(event, variables.system.conditions), *(part.possible for part in watching)]
+            [self.holds(self._conditions.get(event.name, ())), *(part.possible for part in watching)]
         )
         added = self._added.get(event.name)
         allowed = manager.true if added is None else variables.work.count(variables.decision(added))
@@ -149,10 +152,6 @@ class Relations:
             names=names,
             touched=_support(manager, guard, steps),
         )
-
-    def _conditions(self, event: Event, conditions: Iterable[EventCondition]) -> Any:
-        """Return the predicate that those of some conditions that are on an event are true."""
-        return self.holds(item.condition for item in conditions if item.event == event.name)
 
     def _changed(self, automaton: Automaton, event: str) -> set[int]:
         """The places that an automaton may change at an event."""
@@ -245,6 +244,13 @@ class Relations:
             result = variables.work.count(result | (where & inside & expressions.equal(form, digits)))
             known = known | where
         return beyond, result | (~known & kept)
+
+
+def _by_event[T](pairs: Iterable[tuple[str, T]]) -> dict[str, list[T]]:
+    found: dict[str, list[T]] = {}
+    for event, item in pairs:
+        found.setdefault(event, []).append(item)
+    return found
 
 
 def _support(manager: Any, *predicates: Any) -> frozenset[str]:

@@ -1,6 +1,6 @@
 """Places of a state and received data as Boolean variables of a decision diagram."""
 
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Collection, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -26,6 +26,9 @@ _LOOSE_SLOTS = 6_710_886
 With the sizes of its own choice, setting it up takes longer than verifying a dozen states. Its tables grow as fast as
 by its own choice, and as large.
 """
+
+_MANY = 64
+"""Variables, for each one of some, from which these are few."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,9 +194,31 @@ class Variables:
     def all_of(self, predicates: Iterable[Any]) -> Any:
         """Return the predicate that all of the predicates are true."""
         result = self.manager.true
-        for predicate in predicates:
+        # The lowest first: so nothing is built anew for those above.
+        for predicate in sorted(predicates, key=lambda item: -item.level):
             result = result & predicate
         return result
+
+    def without(self, names: Sequence[str], predicate: Any) -> Any:
+        """Return the predicate that is true where some values of variables make one true."""
+        if not self._are_few(names):
+            return self.manager.exist(names, predicate) if names else predicate
+        for name in names:
+            ends = (self.manager.let({name: end}, predicate) for end in (self.manager.true, self.manager.false))
+            predicate = self.any_of(ends)
+        return predicate
+
+    def renamed(self, names: Mapping[str, str], predicate: Any) -> Any:
+        """A predicate with variables called otherwise, by names that it does not depend on."""
+        if not self._are_few(names):
+            return self.manager.let(dict(names), predicate) if names else predicate
+        for name, new in names.items():
+            predicate = self.manager.let({name: self.manager.var(new)}, predicate)
+        return predicate
+
+    def _are_few(self, names: Collection[str]) -> bool:
+        """Return True if variables are better dealt with one by one: all at once, dd goes through all there are."""
+        return _MANY * len(names) < len(self.level)
 
     def chosen(self, digits: Digits, branches: Sequence[Any]) -> Any:
         """The branch of the value that some digits have; false where they have none.
@@ -244,22 +269,22 @@ class Variables:
             for state in states
         )
 
-    def initial(self) -> Any:
-        """Return the predicate that every place has a value that it may begin with."""
-        return self.all_of(
+    def initial(self) -> list[Any]:
+        """Return for each place the predicate that it has a value that it may begin with."""
+        return [
             self.any_of(self.has_value(digits, value) for value in values)
             for digits, values in zip(self.places, initial_values(self.system), strict=True)
-        )
+        ]
 
-    def marked(self) -> Any:
-        """Return the predicate that every automaton is in a marked location."""
-        return self.all_of(
+    def marked(self) -> list[Any]:
+        """Return for each automaton the predicate that it is in a marked location."""
+        return [
             self.chosen(
                 self.places[self.place_of[Subject(item.name)]],
                 [self.manager.true if location in item.marked else self.manager.false for location in item.locations],
             )
             for item in self.system.automata
-        )
+        ]
 
     def possible_data(self, event: str) -> Any:
         """The data that an occurrence of an event can carry."""

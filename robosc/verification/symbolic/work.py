@@ -8,6 +8,12 @@ from robosc.errors import RoboscError, SynthesisCancelled
 PROGRESS_INTERVAL = 64
 """Steps between two reports of progress."""
 
+_FEW = 100
+"""Nodes that are few."""
+
+_MADE = 4
+"""Nodes that the engine makes in a step, in the time in which a part with one node is looked at."""
+
 
 class TooMuchWorkError(RoboscError):
     """The check would take more work than it may."""
@@ -30,9 +36,9 @@ class Work:
         self._should_stop = should_stop
         self._on_progress = on_progress
 
-    def again(self) -> "Work":
-        """Return fresh work of the same limit."""
-        return Work(self.limit, self._should_stop, self._on_progress)
+    def again(self, times: int = 1) -> "Work":
+        """Return fresh work of the same limit, or of that so many times."""
+        return Work(times * self.limit, self._should_stop, self._on_progress)
 
     def spend(self, amount: int) -> None:
         """Count some work.
@@ -53,4 +59,20 @@ class Work:
     def count(self, node: Any) -> Any:
         """Count a diagram that was made; returns it."""
         self.spend(int(node.dag_size))
+        return node
+
+    def count_near(self, node: Any, deepest: int) -> Any:
+        """Count a diagram that was made by a step which works on the levels down to one; returns it.
+
+        If few of its nodes are so high, these alone count: what is below them was there before, or counts later. Else
+        all nodes do, as made by the engine.
+        """
+        seen: set[int] = set()
+        stack = [node]
+        while stack and len(seen) <= _FEW:
+            item = stack.pop()
+            if item.level <= deepest and int(item) not in seen:
+                seen.add(int(item))
+                stack += (item.low, item.high)
+        self.spend(int(node.dag_size) // _MADE if stack else 1 + len(seen))
         return node

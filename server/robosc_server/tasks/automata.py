@@ -64,7 +64,7 @@ class Automata:
         return result
 
     def generation(
-        self, target: str, choices: GenerateOptions, initial: str | None
+        self, target: str, choices: GenerateOptions, initial: str | None, *, is_modular: bool
     ) -> tuple[GeneratedFiles | None, dict[str, Any]]:
         """Return the files of a target, or None, and the fields of the result.
 
@@ -72,7 +72,15 @@ class Automata:
             RequestError: `initial` names a part that does not exist.
             UnknownTargetError: There is no such target.
         """
-        made = generate(self._model, target, choices, self._options, initial=initial, on_progress=self._report)
+        made = generate(
+            self._model,
+            target,
+            choices,
+            self._options,
+            initial=initial,
+            is_modular=is_modular,
+            on_progress=self._report,
+        )
         return made.files, _result_fields(made)
 
     def exploration(self, maximum_states: int) -> tuple[Graph | None, dict[str, Any]]:
@@ -80,13 +88,17 @@ class Automata:
         made = explore(self._model, self._options, maximum_states=maximum_states, on_progress=self._report)
         return made.graph, _result_fields(made)
 
-    def verification(self, maximum_states: int, *, is_strict: bool) -> pb.VerificationResult:
-        """Return the report about a supervisor that is made."""
+    def verification(
+        self, maximum_states: int, *, is_strict: bool, controller: bool, as_is: bool
+    ) -> pb.VerificationResult:
+        """Return the report about a supervisor that is made, or about automata as they stand."""
         found = verify(
             self._model,
             options=self._options,
             maximum_states=maximum_states,
             is_strict=is_strict,
+            controller=controller,
+            as_is=as_is,
             on_progress=self._report,
         )
         return pb.VerificationResult(

@@ -42,6 +42,7 @@ def explanation(request: pb.ExplainRequest, maximum_nodes: int, on_report: OnRep
             event=request.event if request.HasField("event") else None,
             state=request.state if request.HasField("state") else None,
             after=request.after if request.HasField("after") else None,
+            is_modular=request.modular,
             on_progress=report,
         )
     except RequestError as error:

@@ -359,7 +359,6 @@ def _check(message: Any, reader: _RequestReader) -> object:
 
 def _synthesize(message: Any, reader: _RequestReader) -> object:
     bundle = reader.bundle(message.bundle)
-    reader.refuse_of_automata(modular=message.modular)
     return bundle, reader.options(message.options), message.modular
 
 
@@ -395,6 +394,7 @@ def _generate(message: Any, reader: _RequestReader) -> object:
         bundle,
         options,
         reader.text(message.initial),
+        message.modular,
         reader.name(message.target, "the target's name"),
         reader.name(choices.package, "the package's name"),
         choices.publish_state,
@@ -420,6 +420,8 @@ def _verify(message: Any, reader: _RequestReader) -> object:
     is_given, is_robot = bool(message.supervisor), not reader.is_automata
     if is_robot and not is_given and (message.maximum_states or message.strict):
         raise _malformed("maximum_states and strict apply only to a given supervisor, and the request has none")
+    if is_robot and (message.controller or message.as_is):
+        raise _malformed("controller and as_is apply only to automata")
     if is_robot and not is_given and not message.properties and not message.property_files:
         raise _malformed("the request has neither a supervisor nor properties")
     if message.maximum_states > _MAXIMUM_VERIFIED_STATES:
@@ -438,6 +440,8 @@ def _verify(message: Any, reader: _RequestReader) -> object:
         [reader.file(file) for file in message.property_files],
         message.maximum_states or _DEFAULT_VERIFIED_STATES,
         message.strict,
+        message.controller,
+        message.as_is,
     )
 
 
@@ -448,7 +452,10 @@ def _explain(message: Any, reader: _RequestReader) -> object:
     asked = [
         reader.text(getattr(message, name)) if message.HasField(name) else None for name in ("event", "state", "after")
     ]
-    return bundle, deployment, engine, rest, asked
+    reader.refuse_of_robots(modular=message.modular)
+    if message.modular and (message.HasField("state") or message.HasField("after")):
+        raise _malformed("modular explains events: state and after are about the whole robot")
+    return bundle, deployment, engine, rest, asked, message.modular
 
 
 def _format(message: Any, reader: _RequestReader) -> object:

@@ -230,7 +230,8 @@ def _synthesize(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iter
     attempt = SynthesisAttempt()
     result = pb.SynthesisResult()
     with attempt:
-        made = attempt.make(request, limits.nodes, on_report, allow_livelock=request.options.allow_livelock)
+        allow_livelock, is_modular = request.options.allow_livelock, request.modular
+        made = attempt.make(request, limits.nodes, on_report, allow_livelock=allow_livelock, is_modular=is_modular)
         result.accepted.extend(to_proto.findings(made.accepted))
         if made.statistics is not None:
             result.statistics.CopyFrom(to_proto.statistics(made.statistics))
@@ -247,7 +248,9 @@ def _generate(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterat
     require_generatable(request.target)
     choices = from_proto.generation(request.generation)
     if (automata := _automata(request, limits, on_report)) is not None:
-        files, fields = automata.generation(request.target, choices, request.initial or None)
+        files, fields = automata.generation(
+            request.target, choices, request.initial or None, is_modular=request.modular
+        )
     else:
         files, fields = _generated(request, choices, limits, on_report)
     listing = [] if files is None else chunks.listing(files)
@@ -264,7 +267,8 @@ def _generated(
     attempt = SynthesisAttempt()
     files: GeneratedFiles | None = None
     with attempt:
-        made = attempt.make(request, limits.nodes, on_report, allow_livelock=request.options.allow_livelock)
+        allow_livelock, is_modular = request.options.allow_livelock, request.modular
+        made = attempt.make(request, limits.nodes, on_report, allow_livelock=allow_livelock, is_modular=is_modular)
         on_report(Report("generation", request.target))
         found = generate_or_refuse(made.supervisor, made.diagnostics, request.target, choices)
         if isinstance(found, TargetRefusal):
@@ -336,7 +340,12 @@ def _verify(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator
     if (automata := _automata(request, limits, on_report)) is None:
         result = verification(request, limits.nodes, on_report)
     else:
-        result = automata.verification(request.maximum_states or DEFAULT_STATES, is_strict=request.strict)
+        result = automata.verification(
+            request.maximum_states or DEFAULT_STATES,
+            is_strict=request.strict,
+            controller=request.controller,
+            as_is=request.as_is,
+        )
     yield pb.VerifyResponse(result=result)
 
 

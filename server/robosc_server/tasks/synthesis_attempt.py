@@ -60,6 +60,7 @@ class SynthesisAttempt:
         *,
         allow_livelock: bool,
         only_shown: bool = False,
+        is_modular: bool = False,
     ) -> SynthesisOutcome:
         """Make the supervisor of a request."""
         options = request.options
@@ -70,6 +71,7 @@ class SynthesisAttempt:
             verify_limit=from_proto.verified_states(options),
             allow_livelock=allow_livelock,
             only_shown=only_shown,
+            is_modular=is_modular,
             on_progress=lambda step: on_report(Report(step.stage, step.message)),
         )
         return self.made

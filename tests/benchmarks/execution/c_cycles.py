@@ -21,11 +21,13 @@ _COMMON = """
 
 static double ranges[2][360];
 static volatile unsigned sink;
+static int last = -1; /* the communication whose message went out last */
 
 static bool publish(void *context, const @p@_request_t *request)
 {
     (void)context;
     sink += (unsigned)request->communication;
+    last = (int)request->communication;
     return true;
 }
 

@@ -143,7 +143,7 @@ async def test_events_happen_and_the_others_say_why_not(tmp_path: Path) -> None:
         assert answer["blocked"]["tank.c_fill"] == ["requirement order: sensor does not hold (sensor is false)"]
         assert [item["component"] for item in page.entries()[-1]["transitions"]] == ["tank", "order"]
         answer = await done(page, "event", line="sensor true")
-        assert answer["lines"] == ["sensor (value = true): sensor = true"]
+        assert answer["lines"] == ["sensor (true): sensor = true"]
         for _ in range(2):
             answer = await done(page, "event", line="tank.c_fill")
         assert answer["blocked"]["tank.c_fill"] == [
@@ -152,7 +152,7 @@ async def test_events_happen_and_the_others_say_why_not(tmp_path: Path) -> None:
         answer = await done(page, "event", line="tank.c_fill")
         assert (answer["kind"], answer["steps"]) == ("wrong", 4)
         answer = await done(page, "event", line="sensor 3")
-        assert answer["lines"] == ["value of 'sensor' is 3, and must be boolean"]
+        assert answer["lines"] == ["value of 'sensor' is 3, and must be bool"]
         answer = await done(page, "undo")
         assert (answer["redo"], answer["entries"]) == ("tank.c_fill", 3)
         assert (await page.receive("update"))["components"]["tank"]["variables"] == {"level": 2}

@@ -82,7 +82,7 @@ def test_what_is_too_large_to_search_is_not_called_checked() -> None:
         assert outcome.supervisor is not None
         return outcome.supervisor.certificate
 
-    whole, fewer, symbolic, none = certificate(2000), certificate(400), certificate(300), certificate(1)
+    whole, fewer, symbolic, none = certificate(2000), certificate(400), certificate(50), certificate(1)
     assert (whole.safe, whole.maximally_permissive) == ("passed", "passed")
     assert (fewer.safe, fewer.maximally_permissive) == ("passed", "not checked")
     assert "not recomputed: more than 100 states" in fewer.method

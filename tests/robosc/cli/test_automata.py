@@ -68,7 +68,7 @@ def test_what_is_to_blame_is_reported(model: str, capsys: pytest.CaptureFixture[
         assert lines[-4:] == [
             "    tank.u_drain can take tank.level, which is 0, out of its range",
             "to blame: this alone leaves no supervisor",
-            "  tank.cif:1:7: the range of tank.level: integer(0..3)",
+            "  tank.cif:1:7: the range of tank.level: int[0..3]",
             "there is a supervisor without it",
         ]
     assert sentences[0] in lines
@@ -143,10 +143,6 @@ def test_synth_in_modules(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     assert "supervisor automaton sup:" in Path(controlled).read_text()
     document = json.loads(run(capsys, "synth", str(model), "--modular", "--json")[1])
     assert [item["automata"] for item in document["modules"]] == [["tank"], ["tub"]]
-    robot = tmp_path / "robot.rscd"
-    robot.write_text("robot R { component C { incoming message m with type: none } }")
-    status, _, err = run(capsys, "synth", str(robot), "--modular")
-    assert (status, err.count("\n"), "--modular is for automata" in err) == (2, 1, True)
 
 
 def test_the_controlled_system_is_written(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,26 +8,12 @@ from random import Random
 import pytest
 
 import robosc
-from robosc.automata import System, composed
-from robosc.automata.controlled import ControlledGraph, controlled_graph
-from robosc.automata.semantics import Semantics
-from robosc.cif import check_cif
 from robosc.cli.main import main
-from robosc.controller_properties import AutomataProperties, check_automata
-from robosc.source import Bundle, SourceFile
+from robosc.controller_properties import AutomataProperties
+from support.automata_properties import assert_as_defined, checked, system_of
 from support.effort import examples
 from support.random_cif import random_controller, random_model
 from support.random_plain import random_plain
-
-
-def system_of(text: str) -> System | None:
-    return check_cif(Bundle(SourceFile("m.cif", text))).system
-
-
-def checked(system: System) -> AutomataProperties:
-    found = check_automata(composed(system), {}, limit=20_000)
-    assert found is not None
-    return found
 
 
 def model(text: str) -> AutomataProperties:
@@ -110,67 +96,6 @@ def test_orders_that_never_meet_again() -> None:
     assert {order[0] for order in found.disagreement.orders} == {"P.a", "P.b"}
 
 
-# The definitions, written out
-
-
-def _bound(graph: ControlledGraph, is_wanted: Callable[[str], bool]) -> int | None:
-    """CIF's manual: all states, the states after one event, after two, ... until there is none, or nothing changes."""
-    states, number = frozenset(range(len(graph.states))), 0
-    while True:
-        following = frozenset(
-            target for state in states for event, to in graph.steps[state] if is_wanted(event) for target in to
-        )
-        if not following:
-            return number
-        if following == states:
-            return None
-        states, number = following, number + 1
-
-
-def _ahead(graph: ControlledGraph, start: int, may: Callable[[int, str], bool]) -> set[int]:
-    found = {start}
-    while True:
-        more = found | {
-            target for state in found for event, to in graph.steps[state] if may(state, event) for target in to
-        }
-        if more == found:
-            return found
-        found = more
-
-
-def assert_as_defined(system: System) -> AutomataProperties | None:
-    system = composed(system)
-    semantics = Semantics(system)
-    graph = controlled_graph(semantics, {}, limit=400)
-    if graph is None:
-        return None
-    own = {event.name for event in system.events if event.is_controllable}
-    inputs = {item.event for item in system.inputs}
-    found = checked(system)
-    assert found.controllable.bound == _bound(graph, own.__contains__)
-    assert found.uncontrollable.bound == _bound(graph, lambda event: event not in own | inputs)
-    for response, kind in ((found.controllable, True), (found.uncontrollable, False)):
-        assert all((event in own) is kind for event in response.events)
-        assert response.bound is None or response.bound == len(response.events)
-    every = range(len(graph.states))
-    able = [any(event in own for event, _ in graph.steps[state]) for state in every]
-    reached = [_ahead(graph, state, lambda _, event: event in own) for state in every]
-    assert found.checks["confluence"] == all(
-        reached[one] & reached[other] for state in every for one in reached[state] for other in reached[state]
-    )
-    complete = [
-        any(
-            semantics.is_marked(graph.states[target]) and not able[target]
-            for target in _ahead(graph, state, lambda at, event: event in own or not able[at])
-        )
-        for state in every
-    ]
-    assert found.checks["nonblocking_under_control"] == all(complete)
-    if found.blocking is not None:
-        assert found.blocking == graph.trace(complete.index(False))
-    return found
-
-
 @pytest.mark.random
 @pytest.mark.parametrize("seed", range(examples(60)))
 @pytest.mark.parametrize("make", [random_model, random_controller])
@@ -226,3 +151,49 @@ def test_robots_have_another_command_for_it(tmp_path: Path, capsys: pytest.Captu
     assert "--controller is for automata" in capsys.readouterr().err
     with pytest.raises(TypeError, match="controller= is for automata"):
         robosc.verify(path, controller=True)
+    assert main(["verify", str(path), "--as-is"]) == 2
+    assert "--as-is is for automata" in capsys.readouterr().err
+    with pytest.raises(TypeError, match="as_is= is for automata"):
+        robosc.verify(path, as_is=True)
+
+
+def test_automata_as_they_stand(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Synthesis would keep the plants from blocking, and the requirement from being broken."""
+    path = tmp_path / "m.cif"
+    path.write_text("plant P: controllable a, b; location x: initial; marked; edge a goto y; edge b goto z;\n"
+                    "location y: marked; location z; end")  # fmt: skip
+    assert main(["verify", str(path), "--controller"]) == 0
+    capsys.readouterr()
+    assert main(["verify", str(path), "--controller", "--as-is"]) == 1
+    out = capsys.readouterr().out
+    assert "not nonblocking: no marked state can be reached, after P.b" in out
+    assert "no confluence" in out
+    text = (
+        "plant P: uncontrollable u; location x: initial; marked; edge u goto y; location y: marked; end "
+        "requirement R: location r: initial; marked; edge P.u; end requirement invariant not P.y;"
+    )
+    model = robosc.load(text=text, name="m.cif")
+    assert not robosc.verify(model).report.get("faults")
+    found = robosc.verify(model, as_is=True)
+    assert [item["message"] for item in found.report["faults"]] == ["'not P.y' is not true"]
+    made = robosc.synthesize(robosc.load(text="plant P: location x: initial; marked; end", name="m.cif")).supervisor
+    assert made is not None
+    with pytest.raises(TypeError, match="as_is= need a model"):
+        robosc.verify(made, as_is=True)
+    rsup = tmp_path / "m.rsup"
+    made.write(rsup)
+    assert main(["verify", str(rsup), str(path), "--as-is"]) == 2
+    assert "--as-is: the supervisor is FILE.rsup" in capsys.readouterr().err
+
+
+def test_a_supervisor_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "m.cif"
+    path.write_text("supervisor S: controllable a; uncontrollable u; location x: initial; marked; edge a goto y;\n"
+                    "location y: marked; edge u goto x; end")  # fmt: skip
+    assert main(["verify", str(path), "--controller"]) == 1
+    out = capsys.readouterr().out
+    assert "not safe: S.u can happen against the supervisor, after nothing" in out
+    assert "at most 1 uncontrollable and 1 controllable events in a row" in out
+    path.write_text("supervisor invariant true;")
+    assert main(["verify", str(path)]) == 1
+    assert "there is no plant automaton" in capsys.readouterr().err

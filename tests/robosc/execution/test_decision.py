@@ -1,7 +1,10 @@
+from collections.abc import Iterable
+from random import Random
+
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robosc.execution.runtime.decision import FairPolicy, Policy, make_policy
+from robosc.execution.runtime.decision import FairPolicy, Policy, RandomPolicy, make_policy
 
 NAMES = ("a", "b", "c")
 
@@ -10,12 +13,21 @@ def run(policy: Policy, *decisions: tuple[int, ...]) -> list[int]:
     """Return the requests that are issued when these are enabled, one decision after the other."""
     issued = []
     for enabled in decisions:
-        if enabled:
-            chosen = policy.choose(enabled)
+        tell(policy, enabled)
+        chosen = policy.choose()
+        if chosen is not None:
             policy.issued(chosen)
             issued.append(chosen)
-        policy.close(enabled)
+        policy.close()
     return issued
+
+
+def tell(policy: Policy, enabled: Iterable[int]) -> None:
+    """Tell a policy that these are enabled now, and no others."""
+    for request in set(policy.enabled) - set(enabled):
+        policy.disable(request)
+    for request in enabled:
+        policy.enable(request)
 
 
 def test_fair_goes_around_in_source_order() -> None:
@@ -53,10 +65,12 @@ def test_a_decision_with_nothing_enabled_counts_as_a_decision() -> None:
 
 def test_what_could_not_be_issued_has_not_used_its_favour() -> None:
     policy = FairPolicy(2)
-    assert policy.choose((0, 1)) == 0
-    assert policy.choose((1,)) == 1
+    tell(policy, (0, 1))
+    assert policy.choose() == 0
+    policy.withhold(0)
+    assert policy.choose() == 1
     policy.issued(1)
-    policy.close((0, 1))
+    policy.close()
     assert run(policy, (0, 1)) == [0]
 
 
@@ -70,9 +84,11 @@ def test_no_request_starves(case: tuple[int, list[set[int]]]) -> None:
     for enabled_set in enabled_sets:
         # Request 0 waits all the time, while the others come and go as they like.
         enabled = tuple(sorted(enabled_set | {0}))
-        chosen = policy.choose(enabled)
+        tell(policy, enabled)
+        chosen = policy.choose()
+        assert chosen is not None
         policy.issued(chosen)
-        policy.close(enabled)
+        policy.close()
         for request in range(count):
             waiting[request] = waiting[request] + 1 if request in enabled and request != chosen else 0
         # At most N - 1 of N decisions go to others for being new; each of the others is longest-ago issued once.
@@ -91,12 +107,15 @@ def test_fair_agrees_with_the_words(enabled_sets: list[set[int]]) -> None:
         if candidates:
             new = [c for c in candidates if c not in previous and number - favoured_at.get(c, -count) >= count]
             expected = min(new or candidates, key=lambda c: (issued_at.get(c, -1), c))
-            assert policy.choose(candidates) == expected
+            tell(policy, candidates)
+            assert policy.choose() == expected
             policy.issued(expected)
             issued_at[expected] = number
             if new:
                 favoured_at[expected] = number
-        policy.close(candidates)
+        else:
+            tell(policy, ())
+        policy.close()
         previous = enabled
 
 
@@ -117,25 +136,70 @@ def test_random_is_the_same_for_the_same_seed() -> None:
     assert set(first) == {0, 1, 2}
 
 
-@given(st.lists(st.frozensets(st.integers(0, 5)), max_size=12), st.data())
-def test_fair_chooses_as_the_words_say(decisions: list[frozenset[int]], data: st.DataObject) -> None:
-    policy, before = FairPolicy(6), frozenset[int]()
+@given(st.lists(st.frozensets(st.integers(0, 5)), max_size=30), st.lists(st.integers(0, 5), unique=True), st.data())
+def test_it_chooses_as_the_words_say(decisions: list[frozenset[int]], order: list[int], data: st.DataObject) -> None:
+    """Among all that are enabled, or among some of them, those left out that could not be issued."""
+    policy, before = FairPolicy(6, order), frozenset[int]()
     issued, favoured = dict.fromkeys(range(6), -1), dict.fromkeys(range(6), -6)
+
+    def rank(request: int) -> int:
+        return order.index(request) if request in order else len(order)
+
     for number, enabled in enumerate(decisions):
-        candidates = sorted(enabled)
-        while candidates:
-            chosen = policy.choose(tuple(candidates))
+        tell(policy, enabled)
+        left = set(enabled)
+        some = data.draw(st.sets(st.sampled_from(sorted(enabled)))) if enabled else set()
+        while left:
+            among = sorted(left & some) or None
+            chosen = policy.choose(among)
 
             def is_old(request: int, number: int = number, before: frozenset[int] = before) -> bool:
                 return request in before or favoured[request] > number - 6
 
-            assert chosen == min(candidates, key=lambda item: (is_old(item), issued[item], item))
+            def place(item: int) -> tuple[int, bool, int, int]:
+                return (rank(item), is_old(item), issued[item], item) if item not in order else (rank(item), True, 0, 0)
+
+            assert chosen == min(among or left, key=place)
             if data.draw(st.booleans()):
                 policy.issued(chosen)
-                issued[chosen] = number
-                if not is_old(chosen):
-                    favoured[chosen] = number
+                if chosen not in order:
+                    issued[chosen] = number
+                    if not is_old(chosen):
+                        favoured[chosen] = number
                 break
-            candidates.remove(chosen)
-        policy.close(tuple(sorted(enabled)))
+            policy.withhold(chosen)
+            left.remove(chosen)
+        else:
+            assert policy.choose() is None
+        policy.close()
+        assert policy.enabled == set(enabled)
         before = enabled
+
+
+@given(st.lists(st.frozensets(st.integers(0, 5)), max_size=12), st.integers(0, 9))
+def test_chance_takes_every_enabled_request_in_the_order_of_the_source(
+    decisions: list[frozenset[int]], seed: int
+) -> None:
+    policy, dice = RandomPolicy(seed), Random(seed)
+    for enabled in decisions:
+        tell(policy, enabled)
+        left = sorted(enabled)
+        while left:
+            chosen = left[dice.randrange(len(left))]
+            assert policy.choose() == chosen
+            policy.withhold(chosen)
+            left.remove(chosen)
+        assert policy.choose() is None
+        policy.close()
+        assert policy.enabled == sorted(enabled)
+
+
+def test_the_queue_does_not_grow_with_time() -> None:
+    policy = FairPolicy(20)
+    for number in range(4000):
+        tell(policy, {number % 7, number % 11, 19})
+        chosen = policy.choose()
+        assert chosen is not None
+        policy.issued(chosen)
+        policy.close()
+        assert len(policy._queue) <= 60

@@ -215,8 +215,8 @@ def test_a_requirement_automaton_is_reported_with_its_place_and_its_location() -
     found = explain_synthesis(SystemWords(system, SystemPlaces({"limit": AT})), event="go")
     assert explanation_text(found) == (
         "go: restricted\n"
-        "  p.q is b, where it has no transition on go; for instance after go\n"
-        "  'requirement limit' forbids it: limit is y, where it has no transition on go (made.cif:3:5); for instance "
+        "  p.q is b, where it has no edge for go; for instance after go\n"
+        "  'requirement limit' forbids it: limit is y, where it has no edge for go (made.cif:3:5); for instance "
         "after go, stop\n"
     )
 

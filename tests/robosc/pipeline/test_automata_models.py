@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 import robosc
+from robosc.cli.main import main
 from robosc.explanation import EmptyExplanation
 from robosc.pipeline.loading import LoadedAutomata
 from support.automata_models import BUFFER, DOOR, EMPTY, TANK, TWO_TANKS, WRONG
@@ -87,8 +88,6 @@ def test_what_is_of_robots_is_refused(tmp_path: Path) -> None:
     with pytest.raises(TypeError, match="library_paths and interface_paths are for RoboSC models"):
         robosc.load(text=TANK, name="tank.cif", library_paths=[tmp_path])
     robot = robosc.load(text="robot R { component C { incoming message m with type: none } }")
-    with pytest.raises(TypeError, match="is_modular is for automata"):
-        robosc.synthesize(robot, is_modular=True)
     with pytest.raises(TypeError, match="a robot begins in one state"):
         robosc.generate(robot, "python", initial="C = a")
     made = robosc.synthesize(model).supervisor
@@ -99,3 +98,33 @@ def test_what_is_of_robots_is_refused(tmp_path: Path) -> None:
 
 def test_a_notebook_shows_the_text() -> None:
     assert automata(TANK)._repr_markdown_() == f"```\n{TANK.rstrip()}\n```\n"
+
+
+BLIND = """plant lane:
+  controllable c_in, c_out; uncontrollable u_slip;
+  location free: initial; marked; edge c_in goto full; edge c_out;
+  location full: edge c_out goto free; edge u_slip goto lost;
+  location lost: marked; edge c_out goto free;
+end
+requirement invariant not lane.lost;
+"""
+
+
+def test_what_the_supervisor_always_forbids_is_a_warning(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "lane.cif"
+    path.write_text(BLIND)
+    assert robosc.check(path) == ()
+    (found,) = robosc.synthesize(path).diagnostics
+    assert (found.code, found.location and (found.location.line, found.location.column)) == ("never-enabled", (2, 16))
+    assert found.message.startswith("'lane.c_in' can never happen: the supervisor forbids it")
+    # In modules, too; not where something keeps it possible, and not of what plants or requirements never allow.
+    assert robosc.synthesize(path, is_modular=True).diagnostics == (found,)
+    for change in (("edge u_slip goto lost;", "edge u_slip;"), ("not lane.lost", "not lane.full")):
+        path.write_text(BLIND.replace(*change))
+        assert [item.code for item in robosc.synthesize(path).diagnostics] == (
+            ["never-enabled"] if "full" in change[1] else []
+        )
+    path.write_text(BLIND)
+    assert main(["check", str(path), "--synthesize"]) == 0
+    assert "[never-enabled]" in capsys.readouterr().err
+    assert main(["check", str(path), "--synthesize", "--strict"]) == 1

@@ -22,6 +22,8 @@ from robosc.verification import Limits, verify
 from support.cif_meaning import Meaning
 from support.effort import examples
 from support.random_cif import EVENTS, random_model
+from support.random_cif_instances import random_instances
+from support.random_cif_predicates import random_predicates
 
 # In the form that CIF's own tool writes: a requirement became a supervisor, and guards assume its invariants.
 TANK = """plant automaton tank:
@@ -116,6 +118,19 @@ def test_a_written_controlled_system_is_the_one_that_was_synthesized(
     assert robosc.verify(again).passed
     third = supervisor_of(system_of(automata.controlled_system(again)))
     assert behaviour(third, names) == behaviour(made, names)
+
+
+@pytest.mark.random
+@pytest.mark.parametrize("seed", range(examples(30)))
+def test_a_written_system_of_instances_and_predicates_is_read_as_the_same(seed: int) -> None:
+    # One way to begin is enough where all is marked.
+    texts = random_instances(Random(seed)).replace(" in any", ""), random_predicates(Random(seed), is_open=True)
+    for text in texts:
+        system = check_cif(Bundle(SourceFile("m.cif", text))).system
+        made = robosc.synthesize(system).supervisor if system is not None else None
+        if made is not None:
+            again = supervisor_of(system_of(automata.controlled_system(made)))
+            assert (again.added, again.initial, again.states) == ((), None, made.states)
 
 
 def explicit_graph(text: str) -> ControlledGraph:

@@ -254,7 +254,7 @@ def test_every_cause_is_a_sentence() -> None:
     monitor = replace(made.automata[2], alphabet=frozenset({"partly"}), monitors=frozenset({"partly"}))
     made = replace(made, automata=(made.automata[0], requirement, monitor))
     run = robosc.simulate(supervised(made))
-    cannot_be = "it leads only to what the plants cannot be: there !A.{} does not hold"
+    cannot_be = "it leads only to what the plants cannot be: there not A.{} does not hold"
     assert run.possible == ("partly", "u_free")
     assert run.blocked() == {
         "alone": ("requirement left R has no edge for it",),
@@ -302,7 +302,7 @@ def test_data_and_edges_are_chosen_or_asked_for() -> None:
         ({"colour": None}, "value.colour of 'u_seen' is unknown, and must be one of red, green"),
         ({"color": "red"}, "value of 'u_seen' has no part 'color'; did you mean 'colour'?"),
         ({"ranges": 3}, "value.ranges of 'u_seen' is 3, and must be a list"),
-        ({"ranges": [0, True]}, "value.ranges[1] of 'u_seen' is True, and must be integer(0..2)"),
+        ({"ranges": [0, True]}, "value.ranges[1] of 'u_seen' is True, and must be int[0..2]"),
         ("red", "value of 'u_seen' is 'red', and must be a mapping with colour, ranges"),
     ):
         with pytest.raises(robosc.DataError) as caught:

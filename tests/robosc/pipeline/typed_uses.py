@@ -32,8 +32,9 @@ def right(system: System) -> None:
             robosc.simulate(robosc.Supervisor.read(saved))
             print(step.data, enabled, files, checked.report)
     of_system: robosc.SystemSynthesis = robosc.synthesize(system)
-    in_modules: robosc.SystemSynthesis = robosc.synthesize("plant.cif", is_modular=True)
-    print(in_modules.reason)
+    in_modules: robosc.SystemSynthesis = robosc.synthesize(system, is_modular=True)
+    of_robot: robosc.Synthesis = robosc.synthesize("robot.rscd", is_modular=True)
+    print(in_modules.reason, of_robot.reason)
     if of_system.supervisor is not None:
         print(robosc.verify(of_system.supervisor, is_strict=True).passed, of_system.supervisor.conditions["a"])
         by_hand: robosc.SystemRun = robosc.simulate(of_system.supervisor, initial={"A": "idle"})

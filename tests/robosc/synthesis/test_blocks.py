@@ -1,14 +1,18 @@
 """Tests of the wide integers whose bits are interleaved, and of the benefit of that."""
 
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import reduce
+from itertools import combinations
 
 import pytest
 from hypothesis import given, settings
 
-from robosc.automata import DiscreteVariable, EventCondition, InputVariable, System
+from robosc.automata import DiscreteVariable, Edge, EventCondition, InputVariable, System
 from robosc.automata.state import Subject
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import BooleanType, Call, Conditional, Expression, IntegerType, Unary
+from robosc.supervisor.diagram import evaluate
 from robosc.supervisor.predicates import state_predicate, state_predicates
 from robosc.synthesis import SynthesisStatus, blocks, diagrams, synthesize
 from robosc.synthesis.blocks import blocks_of
@@ -85,6 +89,97 @@ def test_one_thing_leads_to_another() -> None:
     assert together(three(chain)) == {("A.n", "B.n", "C.n")}
     assert together(three(operation(a, "<", c), update=operation(b, "+", 1))) == {("A.n", "B.n", "C.n")}
     assert together(three(update=b)) == {("A.n", "B.n")}
+
+
+def counters(
+    count: int,
+    *relations: Expression,
+    type_: IntegerType = WIDE,
+    starts: Sequence[int] = (),
+    are_back: bool = False,
+) -> System:
+    """Integers of one automaton each that go up by one, or back as well, and relations between them."""
+
+    def edges(number: int) -> list[Edge]:
+        counter = read(f"C{number}.n")
+        up = edge(f"l -up{number}-> l", n=operation(counter, "+", 1))
+        return [up, edge(f"l -down{number}-> l", n=operation(counter, "-", 1))] if are_back else [up]
+
+    automata = [
+        automaton(
+            f"C{number}",
+            edges(number),
+            variables=[DiscreteVariable("n", type_, (starts[number] if starts else 0,))],
+        )
+        for number in range(count)
+    ]
+    return replace(system(*automata), invariants=relations)
+
+
+def chained(count: int, type_: IntegerType = WIDE) -> System:
+    """Counters of which none is above the next one."""
+    return counters(
+        count,
+        *(operation(read(f"C{one}.n"), "<=", read(f"C{one + 1}.n")) for one in range(count - 1)),
+        type_=type_,
+    )
+
+
+def total(count: int) -> System:
+    """Counters of which the sum is bounded."""
+    reads: list[Expression] = [read(f"C{number}.n") for number in range(count)]
+    return counters(count, operation(reduce(lambda left, right: operation(left, "+", right), reads), "<", 500))
+
+
+@pytest.mark.parametrize(
+    ("made", "are_together"),
+    [
+        (chained(3), True),
+        (chained(4), False),
+        (chained(2, IntegerType(0, 50)), True),
+        (chained(3, IntegerType(0, 50)), False),
+        # A million values would take more than a chain of six.
+        (chained(6, IntegerType(0, 10**6)), True),
+        (total(4), True),
+        (total(6), False),
+        # If every two are compared, nothing is near all that it is compared with.
+        (
+            counters(5, *(operation(read(f"C{a}.n"), "!=", read(f"C{b}.n")) for a, b in combinations(range(5), 2))),
+            True,
+        ),
+    ],
+)
+def test_long_chains_and_sums_of_counters_stand_one_after_the_other(made: System, are_together: bool) -> None:
+    assert bool(together(made)) == are_together
+
+
+def test_a_datum_stands_by_what_it_is_compared_with() -> None:
+    late = replace(
+        chained(4),
+        inputs=(InputVariable("up2", (), WIDE),),
+        conditions=(EventCondition("up2", operation(read("C1.n"), "<", received())),),
+    )
+    assert blocks_of(late).data == {("up2", ()): Subject("C1", "n")}
+
+
+def test_a_long_chain_takes_no_more_nodes_for_each_place() -> None:
+    """With all bits among each other, each place of the chain would take several times as many as the one before."""
+    shorter, longer = (synthesize(chained(count, IntegerType(0, 50))).statistics.peak_nodes for count in (4, 8))
+    assert longer < 4 * shorter
+
+
+def test_three_places_of_a_thousand_values_have_conditions_on_two() -> None:
+    """Restricted to what matters, a condition relates all three, in more ways than a diagram has branches for."""
+    made = counters(
+        3,
+        *(operation(read(f"C{one}.n"), "<", read(f"C{one + 1}.n")) for one in range(2)),
+        starts=(0, 333, 666),
+        are_back=True,
+    )
+    added = {item.event: item.condition for item in synthesize(made).added}
+    assert {node.automaton for node in added["up1"].nodes} == {"C1", "C2"}
+    for values in ((0, 333, 666), (0, 665, 666), (997, 998, 999), (1, 2, 4)):
+        assert evaluate(added["up1"], lambda name, _: values[int(name[1:])]) == (values[1] + 1 < values[2])  # noqa: B023
 
 
 def test_narrow_integers_stay_as_they_are() -> None:

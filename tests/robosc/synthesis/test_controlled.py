@@ -4,8 +4,9 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache, reduce
-from itertools import combinations
+from itertools import combinations, product
 from random import Random
+from typing import Any
 
 import pytest
 from msgspec import structs
@@ -27,8 +28,11 @@ from robosc.synthesis import (
     Questions,
     Restriction,
     SynthesisProgress,
+    fixed_point,
+    race,
     synthesize,
 )
+from robosc.synthesis.fixed_point import FixedPoint, GoodStates, Problem, Way
 from robosc.verification import ExplicitSupervisor
 from support.effort import seeds
 from support.engines import needs_cudd
@@ -228,7 +232,12 @@ def without_traces(answers: Answers) -> object:
 
 
 @pytest.mark.random
-def test_random_systems(record_property: Callable[[str, object], None]) -> None:
+@pytest.mark.parametrize("smallest", [0, 100])
+def test_random_systems(
+    smallest: int, record_property: Callable[[str, object], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Surroundings of each event give the answers that predicates of the whole give."""
+    monkeypatch.setattr("robosc.synthesis.conjuncts.SMALLEST", smallest)
     met: Counter[str] = Counter()
 
     def compare(seed: int) -> None:
@@ -398,6 +407,23 @@ def test_of_two_alike_the_later_one_can_go(engine: str) -> None:
     each, both = (Restriction((0,)), Restriction((1,))), Restriction((0, 1))
     assert synthesize(system, engine=engine, questions=Questions(restrictions=each)).answers.unused == (1,)
     assert synthesize(system, engine=engine, questions=Questions(restrictions=(both,))).answers.unused == ()
+
+
+def test_whichever_way_less_is_solved_the_answers_are_the_same(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a head start all ways begin, with what is known and without."""
+    begun = set[tuple[str, bool]]()
+
+    def noted(way: Way, problem: Problem, known: Any, place: int, solver: FixedPoint) -> tuple[GoodStates, int]:
+        begun.add((way.__name__, known != known.bdd.false))
+        return way(solver, problem, known), place
+
+    monkeypatch.setattr(race, "HEAD_START", 0)
+    monkeypatch.setattr(race, "SHARE", 1)
+    monkeypatch.setattr(fixed_point, "_way_of_less", noted)
+    test_of_two_alike_the_later_one_can_go(engine)
+    test_a_condition_that_synthesis_looks_ahead_to_is_used(engine)
+    test_causes_of_what_is_cut_by_invariants_and_by_synthesis(engine)
+    assert begun == set(product(("good_states", "reached_good_states"), (False, True)))
 
 
 def test_what_is_watched_counts(engine: str) -> None:

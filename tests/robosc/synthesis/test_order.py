@@ -80,7 +80,7 @@ def test_a_traversal_names_each_thing_once(count: int, is_depth_first: bool, see
 @given(st.integers(4, 10), st.integers(0, 2**32 - 1))
 def test_an_edge_of_some_weight_is_as_many_edges(count: int, seed: int) -> None:
     random = Random(seed)
-    # Of two or four members, so that their centres are exact.
+    # Edges have two or four members, so that their centres are exact.
     edges = [random.sample(range(count), random.choice((2, 4))) for _ in range(random.randint(0, 8))]
     weights = [random.randint(1, 5) for _ in edges]
     repeated = [edge for edge, weight in zip(edges, weights, strict=True) for _ in range(weight)]

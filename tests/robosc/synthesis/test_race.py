@@ -284,7 +284,7 @@ def test_a_race_within_a_race() -> None:
 
     runners = [Runner(inner([[5] * 100])), Runner(inner([[5] * 20, [5] * 9, [5] * 50]))]
     assert outer.first_of(runners) == 301
-    # What the ways of the inner race do is work of the outer one's way.
+    # The work of the inner race's ways counts as that of the outer one's way.
     assert runners[1].nodes == 30 + 3 * 45 - 5 - 10
 
 

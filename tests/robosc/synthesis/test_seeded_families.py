@@ -22,6 +22,8 @@ SMALL = {
     "ring of machines": 8,
     "hub": 4,
     "pairs": 4,
+    "axes": 3,
+    "loads": 3,
     "random network": 2,
 }
 

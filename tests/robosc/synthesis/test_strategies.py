@@ -115,7 +115,7 @@ def test_small_systems_have_no_race() -> None:
 
 @needs_cudd
 def test_others_are_given_up_where_diagrams_become_too_large(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever one strategy can do with so many nodes alone comes out although others began beside it."""
+    """A result that one strategy finds with so many nodes alone comes out although others began beside it."""
     monkeypatch.setattr(race, "HEAD_START", 1)
     monkeypatch.setattr(race, "SHARE", 5_000)
     system = cat_and_mouse(3, 2)

@@ -5,6 +5,7 @@ from dataclasses import replace
 from itertools import islice, product
 from typing import Any
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -12,6 +13,7 @@ from robosc.automata import DiscreteVariable, Semantics, System
 from robosc.automata.compile import State
 from robosc.automata.state import Subject, subject_domain, subjects
 from robosc.expressions import IntegerType
+from robosc.synthesis import synthesize, transitions
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
 from robosc.synthesis.transitions import Steps, transition_of
@@ -112,3 +114,17 @@ def test_under_other_conditions_it_reads_what_they_read(engine: str) -> None:
     added = steps.under(elsewhere).names - steps.names
     assert added == set(encoding.subjects[Subject("B")].names)
     assert steps.under(encoding.manager.true).names == steps.names
+
+
+@settings(max_examples=examples(40))
+@given(st.one_of(any_systems(), any_wide_systems()))
+def test_states_before_an_event_are_found_by_a_relation_as_by_substitution(made: System) -> None:
+    """Both lead back to the same states, whatever an event writes."""
+    found = []
+    for limit in (0, 10**9):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(transitions, "MAXIMUM_SUBSTITUTED", limit)
+            found.append(synthesize(made, engine="autoref"))
+    assert found[0].added == found[1].added
+    assert found[0].status == found[1].status
+    assert found[0].statistics.states == found[1].statistics.states

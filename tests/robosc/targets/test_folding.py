@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from robosc.targets.code.python.bundle import WIDTH
 from robosc.targets.code.python.folding import folded
+from robosc.targets.ros.middleware import _literal
 
 MARK = "  # noqa: E501"
 
@@ -120,3 +121,65 @@ def test_any_expression_means_the_same(expression: str, statement: str) -> None:
     assert ast.dump(ast.parse(found)) == ast.dump(ast.parse(text))
     assert all(len(line) <= WIDTH or line.endswith(MARK) for line in found.splitlines())
     assert folded(found) == found
+
+
+PIECES = """
+@first
+class Described:
+    '''Words
+class of no class:
+    x = 1
+    '''
+
+    value = {
+        "one": 1,
+    }  # a comment
+    if value:
+        other = (
+            2
+        )
+    else:
+        other = 3
+
+    @property
+    def name(self):
+        return "a"
+
+
+class Empty: pass
+try:
+    x = 1
+except ValueError:
+    x = 2
+"""
+
+
+@pytest.mark.parametrize("size", [1, 60, 150, 400])
+def test_a_large_module_is_folded_as_a_small_one(size: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pieces of any size give the same, also with text that looks like the beginning of a statement and is none."""
+    methods = [
+        f"    def name_{name.replace(' ', '_')}(self):\n        {line.format(n='n')}\n"
+        + "\n".join(BODY[line[-1] == ":"])
+        for name, line in LONG.items()
+    ]
+    text = PIECES + "class Long:\n" + "\n".join(methods) + "\n" + PIECES
+    whole = folded(text)
+    assert whole != text
+    monkeypatch.setattr("robosc.targets.code.python.folding._LARGE", 0)
+    monkeypatch.setattr("robosc.targets.code.python.folding._PIECE", size)
+    assert folded(text) == whole
+    assert folded(whole) == whole
+
+
+def test_a_long_literal_is_the_same_on_several_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    states = [
+        {"name": f"state {n}", "initial": not n, "of": [1, {"a": [2] * 40}], "more": {"b": "'\u00e4"}} for n in range(9)
+    ]
+    value = {"name": "Large", "components": states, "none": []}
+    for size in (1, 100, 1000):
+        monkeypatch.setattr("robosc.targets.ros.middleware._LONG", size)
+        text = _literal(value)
+        assert "\n" in text
+        assert ast.literal_eval(text) == value
+    # The lines are those that one long line is broken into.
+    assert folded(f"DEFINITION = {text}\n") == folded(f"DEFINITION = {value!a}\n")

@@ -59,6 +59,7 @@ class Twins:
         self.generated = load_system(supervisor)
         self.interpreted = InterpretedSystem(supervisor)
         self.seen: Counter[str] = Counter()
+        self.known: set[int] = set()
         assert tuple(self.generated.description) == tuple(self.interpreted.description)
 
     def compare(self) -> None:
@@ -68,8 +69,10 @@ class Twins:
             allowed = self.interpreted.enabled(event)
             assert self.generated.enabled(event) is allowed, event
             self.seen["enabled" if allowed else "disabled"] += 1
-        # The generated class must remember the answers that it would give if it asked for each event.
         assert self.generated.enabled_requests() == self.interpreted.enabled_requests()
+        # The generated class must remember the answers that it would give if it asked for each event.
+        self.known ^= set(self.generated.changed_requests())
+        assert tuple(sorted(self.known)) == self.interpreted.enabled_requests()
         assert self.generated.enabled_silent() == self.interpreted.enabled_silent()
         for item in self.model.communications:
             if item.kind is not CommunicationKind.OUTGOING_MESSAGE:
@@ -159,6 +162,7 @@ class Twins:
         self.compare()
         self.generated.restart()
         self.interpreted.restart()
+        self.known.clear()
         self.compare()
 
 

@@ -92,8 +92,14 @@ def _is_server(item: Communication) -> bool:
     return item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
 
 
-def reference(supervisor: Supervisor, *, has_log: bool = True) -> PythonTarget:
-    """The yardstick: the executor of RoboSC on the interpreted system, or its layer if the supervisor is for one."""
+def reference(supervisor: Supervisor, system: Any = None, *, has_log: bool = True) -> PythonTarget:
+    """The yardstick: the executor of RoboSC on the interpreted system, or its layer if the supervisor is for one.
+
+    Args:
+        supervisor: The supervisor.
+        system: The controlled system, if it is not simply the interpreted one.
+        has_log: True if its executor writes a log.
+    """
     runtime = SimpleNamespace(
         Executor=executor.Executor,
         Layer=layer.Layer,
@@ -103,8 +109,8 @@ def reference(supervisor: Supervisor, *, has_log: bool = True) -> PythonTarget:
         NullLog=event_log.NullLog,
         MissingData=protocol.MissingData,
     )
-    system = InterpretedSystem(supervisor)
-    return PythonTarget("reference", supervisor.model, system, runtime, is_layer=_is_layer(supervisor), has_log=has_log)
+    chosen = InterpretedSystem(supervisor) if system is None else system
+    return PythonTarget("reference", supervisor.model, chosen, runtime, is_layer=_is_layer(supervisor), has_log=has_log)
 
 
 def _is_layer(supervisor: Supervisor) -> bool:

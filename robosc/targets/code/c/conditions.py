@@ -7,7 +7,17 @@ from robosc.targets.code.c.expressions import number_code
 from robosc.targets.code.c.statements import statement_lines, unused
 from robosc.targets.code.c.unit import Reading, Unit
 from robosc.targets.code.conditions import Condition, Conditions, Diagrams
-from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code, Kind, Sort, call, operation, variable
+from robosc.targets.code.expressions import (
+    FALSE_CODE,
+    TRUE_CODE,
+    Code,
+    Kind,
+    Sort,
+    call,
+    operation,
+    variable,
+    words_of,
+)
 from robosc.targets.code.statements import Assign, Block, Comment, Return, Statement, when
 
 _SIGNATURE = "const state_t *s"
@@ -44,17 +54,23 @@ class CConditions(CDiagrams, Conditions):
 
     Args:
         unit: The file.
+
+    Attributes:
+        reads: For each event so far, the places that its condition reads, and the functions that it calls.
     """
 
     def __init__(self, unit: Unit) -> None:
         self._unit = unit
         self._layout = unit.layout
+        self.reads: dict[str, set[str]] = {}
         super().__init__(unit.layout.supervisor, unit.system, Reading(unit))
 
     def allow_function(self, event: str) -> list[str]:
         """The function that says whether an event is allowed: plants, ranges, requirements, then the supervisor."""
         body = unused("s")
-        for words, code in self.enabling(event):
+        conditions = self.enabling(event)
+        self.reads[event] = words_of(code for _, code in conditions)
+        for words, code in conditions:
             body += [Comment(words), when(self._scope.negated(code), Return(FALSE_CODE))]
         head = f"static bool {self._layout.function('allows', event)}({_SIGNATURE})"
         return self._unit.definition(head, [*body, Return(TRUE_CODE)])

@@ -178,6 +178,9 @@ def counts(layout: Layout) -> dict[str, int]:
     """The numbers that the engine is made for."""
     model, infos = layout.model, layout.description.communications
     uncontrollable = layout.executable.received
+    silent = len(layout.description.resets) + len(layout.description.taus)
+    # A layer asks whether a request is allowed when it comes.
+    stale, turns = (silent, 0) if layout.is_layer else (silent + len(layout.requests), 2 * len(layout.requests))
     return {
         "EVENT": len(layout.events),
         "COMMUNICATION": len(model.communications),
@@ -186,8 +189,10 @@ def counts(layout: Layout) -> dict[str, int]:
         "ACTION": len(layout.of_kind(CommunicationKind.ACTION)),
         "TOPIC": len(layout.topics),
         "SENSOR": len(layout.of_kind(CommunicationKind.OUTGOING_MESSAGE)),
-        "SILENT": len(layout.description.resets) + len(layout.description.taus),
+        "SILENT": silent,
         "RECEIVED": len(uncontrollable),
+        "STALE": stale,
+        "SET": max(stale, turns, len(layout.topics), len(layout.of_kind(CommunicationKind.ACTION))),
         "CONJUNCT": max((info.conjunct_count for info in infos), default=0),
         "REQUIREMENT": max((info.requirement_count for info in infos if info.kind == "action"), default=0),
         **(

@@ -31,13 +31,13 @@ from robosc.targets.code.c.text import declared
 _ENGINE_NAMES = """
     t ACTION_COUNT AIM_COUNT ASSUMPTION_COUNT COMMUNICATION_COUNT CONJUNCT_COUNT EVENT_COUNT H LIMIT_COUNT
     MISSION_COUNT NO_COMMUNICATIONS NO_EVENT NO_EVENTS NO_NUMBERS NO_SOURCES NO_TOPICS NUMBER_COUNT RECEIVED_COUNT
-    REQUEST_COUNT REQUIREMENT_COUNT SENSOR_COUNT SERVICE_COUNT SILENT_COUNT TOPIC_COUNT UNCONTROLLABLE_DATA
-    UNKNOWN_ELEMENT UNKNOWN_INTEGER VISIT_COUNT WHEN_COUNT acting_t approached call_failed call_t callbacks_t
-    cancel_refused cancel_t cancelling cancelling_t chosen communication_name communication_t counters_t
-    default_settings detour enabled end_t event_name event_t fault fault_t goal_accepted goal_ended goal_t init item_t
-    log_t mission mission_t number_name number_t on_unknown_t outcome_t policy_t refusal_t request_t restart sensor_t
-    sent_t settings_t source_name source_t standing standing_t start state_t status status_t stop tick topic_name
-    topic_t watch
+    REQUEST_COUNT REQUIREMENT_COUNT SENSOR_COUNT SERVICE_COUNT SET_COUNT SILENT_COUNT STALE_COUNT TIMES TOPIC_COUNT
+    UNCONTROLLABLE_DATA UNKNOWN_ELEMENT UNKNOWN_INTEGER VISIT_COUNT WHEN_COUNT acting_t approached call_failed
+    call_t callbacks_t cancel_refused cancel_t cancelling cancelling_t chosen communication_name communication_t
+    counters_t default_settings detour enabled end_t event_name event_t fault fault_t goal_accepted goal_ended
+    goal_t init item_t log_t mission mission_t number_name number_t on_unknown_t outcome_t policy_t refusal_t
+    request_t restart sensor_t sent_t set_t settings_t source_name source_t standing standing_t start state_t status
+    status_t stop tick topic_name topic_t watch
 """.split()
 
 

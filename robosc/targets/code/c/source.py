@@ -17,6 +17,7 @@ from robosc.targets.code.c.layout import Layout, data_that_comes, event_data
 from robosc.targets.code.c.limits import HELPERS_TEXT as LIMITING
 from robosc.targets.code.c.limits import get_function, limit_function, limited, set_function
 from robosc.targets.code.c.provide import default_function, provide_function
+from robosc.targets.code.c.readers import Readers
 from robosc.targets.code.c.received import converter, converter_head, unknown_name
 from robosc.targets.code.c.statements import statement_lines, unused
 from robosc.targets.code.c.step import Stepper
@@ -40,7 +41,8 @@ def source_file(unit: Unit) -> str:
     layout = unit.layout
     conditions = CConditions(unit)
     allows = [conditions.allow_function(event) for event in layout.executable.issued]
-    steppers = [Stepper(unit, event) for event in layout.events if not _never_taken(layout, event)]
+    readers = Readers([conditions.reads[event] for event in _asked(layout)], unit.uses)
+    steppers = [Stepper(unit, event, readers) for event in layout.events if not _never_taken(layout, event)]
     steps = [item.step_function() for item in steppers]
     happens = [item.happen_function() for item in steppers if _happens(layout, item.event)]
     messages = layout.of_kind(CommunicationKind.INCOMING_MESSAGE)
@@ -68,11 +70,19 @@ def source_file(unit: Unit) -> str:
         **HELPERS,
         **dict(unit.functions.values()),
         **{name: "\n".join(lines) for name, lines in (*converters.items(), *conditions.nodes.items())},
+        "changed": runtime_text(layout, "changed.c").rstrip(),
     }
     needed = called(unit.used, unit.uses)
     heads = [f"{converter_head(unit, enum)};" for enum in layout.model.enums if layout.converters[enum.name] in needed]
     texts = [*heads, *(text for name, text in functions.items() if name in needed)]
-    return "\n\n".join([_prologue(layout), *texts, *("\n".join(block) for block in rest)]) + "\n"
+    start = [_prologue(layout, readers), runtime_text(layout, "sets.c").rstrip()]
+    return "\n\n".join([*start, *texts, *("\n".join(block) for block in rest)]) + "\n"
+
+
+def _asked(layout: Layout) -> list[str]:
+    """The events that are asked again and again whether they are allowed: silent steps, then requests."""
+    requests = [] if layout.is_layer else [item.event(EventKind.REQUEST) for item in layout.requests]
+    return [*layout.description.resets, *layout.description.taus, *requests]
 
 
 def _never_taken(layout: Layout, event: str) -> bool:
@@ -86,7 +96,7 @@ def _happens(layout: Layout, event: str) -> bool:
     return not found.is_issued and found.kind is not EventKind.ERROR
 
 
-def _prologue(layout: Layout) -> str:
+def _prologue(layout: Layout, readers: Readers) -> str:
     prefix = layout.prefix
     numbers = counts(layout)
     with_data = sum(_happens(layout, event) and bool(converted_paths(layout.model, event)) for event in layout.events)
@@ -103,6 +113,7 @@ def _prologue(layout: Layout) -> str:
         "#endif",
         "",
         f"#define {layout.upper}_UNCONTROLLABLE_DATA {with_data}",
+        f"#define {layout.upper}_TIMES {_waited_for(layout, numbers)}",
         "#define FOREVER UINT64_MAX",
         f"#define SILENT_BOUND INT64_C({layout.description.silent_bound})",
         "#define PATIENCE 8",
@@ -122,7 +133,15 @@ def _prologue(layout: Layout) -> str:
             "    bool is_enum_unknown;",
             "} notes_t;",
         ]
-    return "\n".join([*lines, *_unknown_constants(layout), *_tables(layout, numbers)])
+    table = readers.lines()
+    return "\n".join([*lines, *_unknown_constants(layout), *_tables(layout, numbers), *([""] if table else []), *table])
+
+
+def _waited_for(layout: Layout, numbers: dict[str, int]) -> int:
+    """Number of things that something is done about if they take too long."""
+    count = numbers["SENSOR"] + numbers["SERVICE"] + numbers["ACTION"]
+    count += numbers["TOPIC"] if layout.is_layer else 0
+    return count + (layout.supervisor.strategy is not None)
 
 
 def _unknown_constants(layout: Layout) -> list[str]:
@@ -165,16 +184,17 @@ def _tables(layout: Layout, numbers: dict[str, int]) -> list[str]:
     services, actions, sensors = ([item.name for item in layout.of_kind(kind)] for kind in _NUMBERED)
     topics = list(layout.topics)
     requests = []
-    for item in layout.requests:
+    following = _following(layout)
+    for number, item in enumerate(layout.requests):
         topic = topics.index(item.identifier) if item.kind is CommunicationKind.INCOMING_MESSAGE else -1
         places = (names.index(item.name) if item.name in names else -1 for names in (services, actions))
-        numbers_of = (str(number) for number in (topic, *places, infos[item.name].conjunct_count))
+        numbers_of = map(str, (topic, *places, infos[item.name].conjunct_count, following[number]))
         identifier = [string_literal(item.identifier)] if layout.is_layer else []
         name = layout.events[item.event(EventKind.REQUEST)]
         requests.append([layout.communications[item.name], name, *numbers_of, *identifier])
     members = [f"{communication} communication", f"{event} event", "int topic", "int service", "int action"]
-    members += ["int conjuncts", *(["const char *identifier"] if layout.is_layer else [])]
-    words = "Requests in source order; -1 where something does not apply."
+    members += ["int conjuncts", "int next", *(["const char *identifier"] if layout.is_layer else [])]
+    words = "Requests in source order; -1 where something does not apply. `next`: the next one on the same topic."
     lines = _table(members, "REQUESTS", requests, words)
     if layout.is_layer and layout.numbers:
         owners = [name for name, _ in layout.numbers]
@@ -182,10 +202,11 @@ def _tables(layout: Layout, numbers: dict[str, int]) -> list[str]:
         lines += _table("int", "FIRST_NUMBERS", rows, "Each request's first number.")
     errors = [[layout.communications[name], layout.events[f"{name}.error"]] for name in services]
     lines += _table([f"{communication} communication", f"{event} error"], "SERVICES", errors)
-    members = [f"{communication} communication", f"{event} cancel", f"{event} error", "int requirements"]
+    members = [f"{communication} communication", f"{event} cancel", f"{event} error", "int requirements", "int request"]
+    numbers_by_name = {item.name: number for number, item in enumerate(layout.requests)}
     ends = [
         [layout.communications[name], layout.events[f"{name}.cancel"], layout.events[f"{name}.error"],
-         str(infos[name].requirement_count)] for name in actions
+         str(infos[name].requirement_count), str(numbers_by_name[name])] for name in actions
     ]  # fmt: skip
     lines += _table(members, "ACTIONS", ends)
     silent = [layout.events[name] for name in (*layout.description.resets, *layout.description.taus)]
@@ -209,6 +230,19 @@ def _tables(layout: Layout, numbers: dict[str, int]) -> list[str]:
     lines += _table(["const char *name", "int tour", "int detours"], "MISSIONS", missions, words)
     words = "Tours: the aims that are the visits of a mission, or of one of its detours."
     return lines + _table(["int mission", "int first", "int visits"], "TOURS", tours, words)
+
+
+def _following(layout: Layout) -> list[int]:
+    """The number of the next request on the same topic for each request, the first one after the last; else its own."""
+    following = list(range(len(layout.requests)))
+    last: dict[str, int] = {}
+    for number, item in enumerate(layout.requests):
+        if item.kind is CommunicationKind.INCOMING_MESSAGE:
+            if item.identifier in last:
+                following[number] = following[last[item.identifier]]
+                following[last[item.identifier]] = number
+            last[item.identifier] = number
+    return following
 
 
 def _table(type_: str | list[str], name: str, rows: Sequence[str | list[str]], words: str = "") -> list[str]:
@@ -246,17 +280,17 @@ def _dispatchers(unit: Unit) -> list[list[str]]:
     result.append(_switch(head_, "s event", "event", allowed, "return false;"))
     if layout.requests or layout.description.taus:
         taken = [
-            (events[event.name], f"return {function('takes', event.name)}(s);")
+            (events[event.name], f"return {function('takes', event.name)}(r);")
             for event in layout.executable.events.values()
             if (event.is_issued and not _never_taken(layout, event.name)) or event.kind is EventKind.ERROR
         ]
-        head_ = f"static int take_event(state_t *s, {event})"
-        result.append(_switch(head_, "s event", "event", taken, "return REFUSED;"))
+        head_ = f"static int take_event({layout.prefix}_t *r, {event})"
+        result.append(_switch(head_, "r event", "event", taken, "return REFUSED;"))
     requests = list(enumerate(layout.requests))
     if requests and not layout.is_layer:
         given = [(place, f"return {function('provides', item.name)}(s, data);") for place, item in requests]
         head_ = f"static bool get_data({state}, int request, {data})"
-        result.append(_switch(head_, "s request data", "request", given, "return false;"))
+        result.append(_switch(head_, "s request data", "request", given, "return true;"))
     messages = [(place, item) for place, item in requests if item.kind is CommunicationKind.INCOMING_MESSAGE]
     if messages and not layout.is_layer:
         defaults = [(place, f"return {function('is_default', item.name)}(data);") for place, item in messages]

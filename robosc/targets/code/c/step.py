@@ -11,6 +11,7 @@ from robosc.model.structure import is_tau
 from robosc.targets.code.c.expressions import c_type, number_code
 from robosc.targets.code.c.layout import event_data, width
 from robosc.targets.code.c.naming import CNamer
+from robosc.targets.code.c.readers import Readers
 from robosc.targets.code.c.received import NAMES, NO_NOTES, Reader
 from robosc.targets.code.c.statements import unused
 from robosc.targets.code.c.text import declared
@@ -22,6 +23,7 @@ from robosc.targets.code.expressions import (
     Sort,
     bounds_of,
     call,
+    integer,
     literal,
     operation,
     variable,
@@ -30,7 +32,8 @@ from robosc.targets.code.expressions import (
 from robosc.targets.code.statements import Assign, Block, Do, If, Let, Return, Statement, codes, when
 from robosc.targets.code.steps import StepWriter
 
-_OLD, _SKIPPED, _NOTHING = variable("old"), variable("skipped"), literal("0", Sort.INTEGER)
+_STATE, _OLD = variable("s"), variable("old")
+_SKIPPED, _NOTHING = variable("skipped"), literal("0", Sort.INTEGER)
 
 
 class Stepper(StepWriter):
@@ -39,12 +42,14 @@ class Stepper(StepWriter):
     Args:
         unit: The file.
         event: The event.
+        readers: Table of the events that read each place of the state.
     """
 
     refused = literal("REFUSED", Sort.INTEGER)
 
-    def __init__(self, unit: Unit, event: str) -> None:
+    def __init__(self, unit: Unit, event: str, readers: Readers) -> None:
         self.unit = unit
+        self.readers = readers
         self.event = event
         self.data = None if is_tau(event) else event_data(unit.layout.model, event)
         self.paths = converted_paths(unit.layout.model, event) if self.data is not None else ()
@@ -54,14 +59,17 @@ class Stepper(StepWriter):
 
     def step_function(self) -> list[str]:
         """The function that takes the event: how many updates were skipped, or REFUSED."""
-        parameters = ["state_t *s", *(self._parameter(path) for path in self.paths)]
+        parameters = [f"{self.unit.layout.prefix}_t *r", *(self._parameter(path) for path in self.paths)]
         body: list[Statement] = [*self._refusals(), *self._plant(), *self._components()]
         start: list[Statement] = []
-        if _OLD.word in words_of(codes(body)):
-            start.append(Let(_OLD, variable("*s"), "const state_t"))
+        words = words_of(codes(body))
+        if _STATE.word in words:
+            start.append(Let(_STATE, variable("&r->state"), "state_t *const"))
+        if _OLD.word in words:
+            start.append(Let(_OLD, variable("r->state"), "const state_t"))
         if self.may_skip:
             start.append(Let(_SKIPPED, _NOTHING, "int"))
-        start += unused("s", *(code.word for code in self._received.values()))
+        start += unused("r", *(code.word for code in self._received.values()))
         head = f"static int {self.unit.layout.function('takes', self.event)}({', '.join(parameters)})"
         return self.unit.definition(head, [*start, *body, Return(_SKIPPED if self.may_skip else _NOTHING)])
 
@@ -69,7 +77,7 @@ class Stepper(StepWriter):
         """The function that converts what came with an event of the environment and takes it."""
         layout, name = self.unit.layout, self.unit.layout.events[self.event]
         parameters = [f"{layout.prefix}_t *r"]
-        arguments = [variable("&r->state")]
+        arguments = [variable("r")]
         body = unused("may_keep")
         if self.data is not None:
             parameters.append(layout.parameter(self.data, "data"))
@@ -95,7 +103,13 @@ class Stepper(StepWriter):
         return declared(f"const {self.unit.layout.raw(type_)} *" if is_array else c_type(code.sort), code.word)
 
     def _write(self, place: Code, value: Code, may_stay: bool) -> list[Statement]:
-        return [Assign(place, value)]
+        readers = self.readers.of(place.word)
+        noted = [] if readers is None else [integer(readers)]
+        changed = Do(call("changed" if noted else "all_changed", variable("r"), *noted))
+        if not may_stay:
+            return [Assign(place, value), changed]
+        # The new one of equal numbers counts, too, such as -0.0 after 0.0.
+        return [when(_differs(place, value), changed), Assign(place, value)]
 
     def _choice(self, branches: Sequence[tuple[Code, Block]], is_whole: bool) -> Block:
         # They all look at the state before, so that none of them needs an else.
@@ -116,11 +130,24 @@ class Stepper(StepWriter):
                 return value
 
     def _is_at_hand(self, type_: Type, value: Code) -> bool:
-        return value.is_within(*bounds_of(type_)) if isinstance(type_, IntegerType) else value.is_known
+        is_simple = value.is_literal or value in self._received.values()
+        is_in_range = value.is_within(*bounds_of(type_)) if isinstance(type_, IntegerType) else value.is_known
+        return is_simple and is_in_range
 
     def _unless_skipped(self, name: str, type_: Type, held: Code, written: Block) -> Block:
+        if held.is_within(*bounds_of(type_)) if isinstance(type_, IntegerType) else held.is_known:
+            return written
         self.may_skip = True
         return [If([(_fits(type_, held), written)], [Do(operation("increment", _SKIPPED))])]
+
+
+def _differs(place: Code, value: Code) -> Code:
+    """Return the code that tests whether a place holds something else than a value."""
+    if value in (TRUE_CODE, FALSE_CODE):
+        return operation("not", place) if value == TRUE_CODE else place
+    if value.sort is Sort.TEXT:
+        return operation("!=", call("strcmp", place, value), _NOTHING)
+    return operation("!=", place, value)
 
 
 def _fits(type_: Type, held: Code) -> Code:

@@ -8,9 +8,9 @@ import ast
 import io
 import textwrap
 import tokenize
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
 from token import COMMENT, DEDENT, ENDMARKER, FSTRING_END, FSTRING_START, INDENT, NEWLINE, NL, OP, STRING
+from typing import NamedTuple
 
 from robosc.errors import InternalError
 from robosc.targets.code.python.bundle import WIDTH
@@ -22,9 +22,19 @@ _OPEN, _CLOSE = frozenset("([{"), frozenset(")]}")
 _LONG = ('"""', "'''")
 _MARK = "  # noqa: E501"
 
+_INDENT = "    "
+_HEAD = "class _:\n"
+_WITHIN = frozenset(("", " ", "\t", ")", "]", "}", "#"))
+"""Beginnings of lines that no statement has."""
 
-@dataclass(frozen=True, slots=True)
-class _Token:
+_GOING_ON = ("elif", "else", "except", "finally")
+"""Beginnings of lines with which the statement before goes on."""
+
+_LARGE, _PIECE = 200_000, 2_000
+"""Characters from which a module is folded piece by piece, and characters that a piece has at least."""
+
+
+class _Token(NamedTuple):
     """Part of a line: a token of Python, or the blanks between two.
 
     Attributes:
@@ -59,9 +69,53 @@ def folded(text: str) -> str:
     Raises:
         InternalError: The result would have another meaning.
     """
+    if len(text) <= _LARGE:
+        return _folded_whole(text)
+    # The syntax tree of a large module takes a hundred times the memory of its text.
+    return "".join(_folded_whole(head + piece)[len(head) :] for head, piece in _pieces(text))
+
+
+def _pieces(text: str) -> Iterator[tuple[str, str]]:
+    """Pieces of a module, each of whole statements, after the head of a class that they are to stand in, or nothing."""
+    for piece in _cut(text.removesuffix("\n").split("\n"), ""):
+        header, _, inner = piece.partition("\n")
+        if len(piece) > _LARGE and header.startswith("class ") and header.endswith(":") and len(header) <= WIDTH:
+            yield "", header + "\n"
+            yield from ((_HEAD, part) for part in _cut(inner.removesuffix("\n").split("\n"), _HEAD))
+        else:
+            yield "", piece
+
+
+def _cut(lines: Iterable[str], head: str) -> Iterator[str]:
+    """Texts of whole statements, of which each but the last is long enough or stands before a class."""
+    indent = len(_INDENT) * bool(head)
+    found: list[str] = []
+    size = 0
+    for line in lines:
+        may_begin = not line[:indent].strip() and line[indent : indent + 1] not in _WITHIN
+        may_begin = may_begin and not line[indent:].startswith(_GOING_ON)
+        is_due = size >= _PIECE or (not head and line.startswith("class "))
+        if found and may_begin and is_due and _is_whole(head + "".join(found)):
+            yield "".join(found)
+            found, size = [], 0
+        found.append(line + "\n")
+        size += len(line) + 1
+    yield "".join(found)
+
+
+def _is_whole(text: str) -> bool:
+    """Return True if a text is a module by itself: then what follows it has the same meaning without it."""
+    try:
+        ast.parse(text)
+    except SyntaxError:
+        return False
+    return True
+
+
+def _folded_whole(text: str) -> str:
     # Not `splitlines`, which sees more ends of lines than Python does.
     lines = text.removesuffix("\n").split("\n")
-    if all(len(line) <= WIDTH for line in lines):
+    if all(len(line) <= WIDTH or line.endswith(_MARK) for line in lines):
         return text
     ends: dict[int, int] = {}
     depths: dict[int, int] = {}
@@ -163,18 +217,21 @@ def _stripped(tokens: Sequence[_Token]) -> list[_Token]:
     kept = tokens[solid[0] : solid[-1] + 1] if solid else []
     pairs: dict[int, int] = {}
     opened: list[int] = []
-    for number, token in enumerate(kept):
-        if token.opens:
-            opened.append(number)
-        elif token.closes and opened:
-            pairs[opened.pop()] = number
+    for number, (kind, text, _) in enumerate(kept):
+        if kind == OP:
+            if text in _OPEN:
+                opened.append(number)
+            elif text in _CLOSE and opened:
+                pairs[opened.pop()] = number
     closing = set(pairs.values())
     depth = 0
     found: list[_Token] = []
     for number, token in enumerate(kept):
-        depth -= number in closing
-        found.append(token if token.depth == depth else _Token(token.kind, token.text, depth))
-        depth += number in pairs
+        if number in closing:
+            depth -= 1
+        found.append(token if token[2] == depth else _Token(token[0], token[1], depth))
+        if number in pairs:
+            depth += 1
     return found
 
 

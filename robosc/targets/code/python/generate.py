@@ -15,11 +15,12 @@ from robosc.targets.code.expressions import Code
 from robosc.targets.code.nesting import shallow
 from robosc.targets.code.python.bundle import WIDTH, bundle, section_title
 from robosc.targets.code.python.changes import (
+    changed_requests_method,
     enabled_requests_method,
     enabled_silent_method,
     question_lines,
     restart_lines,
-    stale_bits,
+    stale_marks,
 )
 from robosc.targets.code.python.expressions import constant
 from robosc.targets.code.python.folding import folded
@@ -105,7 +106,7 @@ def model_part(supervisor: Supervisor) -> str:
 
 
 def _model_part(writer: Writer) -> str:
-    writer.used |= {"numbers_after", "numbers_of"}
+    writer.used |= {"numbers_of", "turned"}
     functions = [converter(writer.layout, enum, writer.used) for enum in writer.model.enums]
     members = _class(writer)
     missing = writer.used - bundle(RUNTIME[writer.layout.supervisor.deployment]).names
@@ -143,12 +144,13 @@ def _class(writer: Writer) -> list[str]:
     allows = [conditions.allow_method(event) for event in writer.layout.executable.issued]
     description = describe(writer.layout.supervisor)
     requests, silent = _allow_names(writer, description)
-    writer.stale = stale_bits([*requests, *silent], conditions.reads)
+    writer.marks = stale_marks(requests, silent, conditions.reads)
     methods = [
         _constructor(writer, description),
         _restart(writer, len(requests), len(silent)),
         *_PROTOCOL_METHODS,
         enabled_requests_method(requests),
+        changed_requests_method(requests),
         enabled_silent_method(len(requests), len(silent)),
         _location(writer),
         _state(writer),

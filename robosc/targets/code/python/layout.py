@@ -10,6 +10,7 @@ from robosc.supervisor import Supervisor
 from robosc.targets.code.python.naming import PythonNamer
 
 PROTOCOL_NAMES = (
+    "changed_requests",
     "changes",
     "choose",
     "conjuncts",

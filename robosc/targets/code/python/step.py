@@ -167,8 +167,8 @@ class _StepWriter(StepWriter):
 
     def _write(self, place: Code, value: Code, may_stay: bool) -> list[Statement]:
         if may_stay:
-            return noted_write(place, value, self.writer.stale)
-        return [Assign(place, value), *noted_change(place, self.writer.stale)]
+            return noted_write(place, value, self.writer.marks)
+        return [Assign(place, value), *noted_change(place, self.writer.marks)]
 
     def _choice(self, branches: Sequence[tuple[Code, Block]], is_whole: bool) -> Block:
         if not is_whole:

@@ -10,6 +10,7 @@ from robosc.supervisor import Supervisor
 from robosc.targets.code.python.conditions import PythonConditions
 from robosc.targets.code.python.expressions import Scope
 from robosc.targets.code.python.layout import Layout, make_layout
+from robosc.targets.code.statements import Statement
 
 
 @dataclass(slots=True)
@@ -22,7 +23,7 @@ class Writer:
         used: Functions of the runtime modules that the generated code calls.
         scope: Scope for writing expressions over the state.
         conditions: Writer of conditions over the state.
-        stale: For each attribute the bits of the events whose permission reads it, once that is known.
+        marks: For each attribute what notes another value of it, once that is known.
         skipping: Events whose step may skip an update, so far.
     """
 
@@ -31,7 +32,7 @@ class Writer:
     used: set[str] = field(default_factory=set)
     scope: Scope = field(init=False)
     conditions: PythonConditions = field(init=False)
-    stale: dict[str, int] = field(default_factory=dict)
+    marks: dict[str, list[Statement]] = field(default_factory=dict)
     skipping: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:

@@ -1,5 +1,6 @@
 """The controlled system of a CIF model, written as one: read again, it behaves as the supervisor says."""
 
+import re
 from random import Random
 from typing import Any
 
@@ -17,6 +18,7 @@ from robosc.pipeline.systems import SystemSupervisor, synthesize_system
 from robosc.source import Bundle, SourceFile
 from robosc.supervisor.predicates import state_predicates
 from robosc.targets.cif import automata
+from support.cif_supported import problems
 from support.effort import examples
 from support.random_cif import random_model
 from support.systems import Unrestricted
@@ -137,6 +139,71 @@ def test_random_models(seed: int, limit: int, monkeypatch: pytest.MonkeyPatch) -
     assert runs(read_again(wider)) == runs(supervisor.system, supervisor), text
 
 
+def differences(random: Random) -> str:
+    """A model in the part of CIF that its synthesis takes, with a difference as the outermost operator of a value."""
+
+    def value() -> str:
+        sums = random.sample(["x", "y", "1", "x + y", "2", "y + 3", "x div 2"], 2)
+        return random.choice([f"{sums[0]} - ({sums[1]})", sums[0]])
+
+    def guard() -> str:
+        return f"x {random.choice(['<', '>', '!='])} {random.randrange(3)}"
+
+    edges = " ".join(f"edge c_{event} when {guard()} do x := {value()}, y := {value()};" for event in "abc")
+    first, second = random.randrange(3), random.randrange(2)
+    return (
+        f"plant p: controllable c_a, c_b, c_c; uncontrollable u; disc int[{first}..{first + 3}] x; "
+        f"disc int[{second}..4] y; location: initial; marked; {edges} edge u when x = 2 do y := 4; end "
+        f"requirement p.u needs p.y != {random.randrange(1, 4)}; requirement p.c_a needs p.x + p.y < 5;"
+    )
+
+
+@pytest.mark.random
+@pytest.mark.parametrize("limit", [automata.FORMULA_LIMIT, 0])
+@pytest.mark.parametrize("seed", range(examples(40)))
+def test_tools_of_cif_take_what_is_written_if_they_take_the_model(
+    seed: int, limit: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(automata, "FORMULA_LIMIT", limit)
+    model = differences(Random(seed))
+    found = check_cif(Bundle(SourceFile("m.cif", model)))
+    if found.system is None:
+        # A value that never meets the range is an error.
+        assert {item.code for item in found.diagnostics if item.severity == "error"} == {"cif-type"}
+        return
+    supervisor = supervisor_of(model)
+    if supervisor is None:
+        return
+    text = written(supervisor)
+    # The reader of what synthesis takes knows no invariants of supervisors, and no variables of an automaton.
+    lines = [re.sub(r"^supervisor (?!automaton)", "requirement ", line) for line in text.splitlines()]
+    lines.sort(key=lambda line: not line.startswith("  alg "))
+    assert problems("".join(f"{line}\n" for line in lines)) == [], text
+    wider = re.sub(r"int\[(\d)\.\.\d\] (\w) = ", r"int[-9..19] \2 = ", text)
+    assert runs(read_again(wider)) == runs(supervisor.system, supervisor), text
+
+
+def test_a_difference_is_compared_as_a_sum() -> None:
+    model = "plant p: controllable c_a, c_b, c_c; disc int[0..3] x; disc int[2..5] y; location: initial; marked; {} end"
+    for update, guard in (
+        ("x := x - 1", "1 <= p.x"),
+        ("x := x - y", "p.y <= p.x"),
+        ("y := y - x", "p.x + 2 <= p.y"),
+        ("y := y + 5 - x", "p.y + 5 <= p.x + 5"),
+        ("x := x + y - 1", "p.x + p.y <= 4"),
+    ):
+        supervisor = supervisor_of(model.format(f"edge c_a do {update}; edge c_b do x := 3; edge c_c do y := 5;"))
+        assert supervisor is not None
+        assert f"    edge p.c_a when {guard};" in written(supervisor).splitlines(), written(supervisor)
+    # Below zero, or beyond 32 bits, it stays a difference.
+    for type_, guard in (("int[-2..3]", "-2 <= p.x - 1"), ("int[2147483640..2147483647]", "2147483640 <= p.x - 1")):
+        supervisor = supervisor_of(
+            f"plant p: controllable c; disc {type_} x; location: initial; marked; edge c do x := x - 1; end"
+        )
+        assert supervisor is not None
+        assert f"    edge p.c when {guard};" in written(supervisor).splitlines(), written(supervisor)
+
+
 CHOICE = """plant p:
   uncontrollable u;
   disc int[0..2] x in any;
@@ -155,12 +222,20 @@ group a:
 end
 """
 
+NEVER = """controllable go; uncontrollable u;
+plant p:
+  alg int[0..2] m = 2; disc int[0..2] x;
+  location: initial; marked; edge go when x < 1 do x := x + 1; edge u when x = 2 do x := m + m;
+end
+"""
+
 
 @pytest.mark.parametrize(
     ("model", "line"),
     [
         pytest.param(CHOICE, "  initial p.x != 1;", id="initial-states-are-those-of-the-supervisor"),
         pytest.param(HIDDEN, "      edge ^go when not a do a := go;", id="hidden-name-is-written-from-the-root"),
+        pytest.param(NEVER, "    edge u when x = 2 do x := if true: 4 else 0 end;", id="value-is-never-in-range"),
     ],
 )
 def test_a_supervisor_is_written_so_that_it_is_read_as_the_same(model: str, line: str) -> None:

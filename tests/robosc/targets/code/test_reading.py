@@ -3,13 +3,10 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robosc.targets.code.python.runtime.reading import numbers_after, numbers_of
+from robosc.targets.code.python.runtime.reading import numbers_of, turned
 
 
-@given(st.lists(st.booleans(), max_size=30), st.data())
-def test_numbers_after_some_flags_turned_are_those_of_the_flags(flags: list[bool], data: st.DataObject) -> None:
-    turned = data.draw(st.lists(st.sampled_from(range(len(flags))), unique=True)) if flags else []
-    before = numbers_of(flags)
-    for number in turned:
-        flags[number] = not flags[number]
-    assert numbers_after(before, flags, turned) == numbers_of(flags)
+@given(st.lists(st.tuples(st.booleans(), st.booleans()), max_size=30))
+def test_flags_that_turned_are_those_of_one_side_alone(pairs: list[tuple[bool, bool]]) -> None:
+    before, after = ([pair[side] for pair in pairs] for side in (0, 1))
+    assert set(turned(before, after)) == set(numbers_of(before)) ^ set(numbers_of(after))

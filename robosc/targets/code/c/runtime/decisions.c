@@ -32,7 +32,7 @@ static bool send(robot_t *r, int request, const robot_request_t *data)
     if (REQUESTS[request].action >= 0) {
         robot_goal_t *goal = open_goal(r, REQUESTS[request].action);
         if (!callbacks->send_goal(callbacks->context, goal->id, data)) {
-            goal->is_open = false;
+            set_open(r, REQUESTS[request].action, false);
             return fault(r, ROBOT_FAULT_CALLBACK);
         }
         return true;
@@ -48,7 +48,7 @@ static bool send(robot_t *r, int request, const robot_request_t *data)
 static bool issue(robot_t *r, int request, bool *is_issued)
 {
     robot_request_t data;
-    const bool is_unchanging = r->is_unchanging[request];
+    const bool is_unchanging = is_in(&r->unchanging, request);
     bool has_changed = false;
     *is_issued = false;
     memset(&data, 0, sizeof data);
@@ -86,7 +86,9 @@ static bool issue(robot_t *r, int request, bool *is_issued)
         return false;
     }
     if (REQUESTS[request].topic >= 0) {
-        r->is_unchanging[request] = !has_changed;
+        if (!has_changed) {
+            add_to(&r->unchanging, request);
+        }
 #if ROBOT_TOPIC_COUNT > 0
         if (is_acting) {
             const bool is_default = is_data_default(request, &data);
@@ -111,31 +113,25 @@ static bool issue(robot_t *r, int request, bool *is_issued)
     return true;
 }
 
-/* Issue what the policy chooses among the candidates, or the next if its data is unknown or does not fit. */
-static bool issue_one_of(robot_t *r, bool *candidates, int *issued)
+/* Issue what the policy chooses among some candidates, or the next if its data is unknown or does not fit. */
+static bool issue_one_of(robot_t *r, robot_set_t *among, bool *is_issued)
 {
-    *issued = -1;
-    for (;;) {
-        bool is_issued = false;
-        bool is_any = false;
-        int chosen = 0;
-        for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
-            is_any = is_any || candidates[request];
-        }
-        if (!is_any) {
-            return true;
-        }
-        chosen = choose(r, candidates);
-        if (!issue(r, chosen, &is_issued)) {
+    int turn = choose(r, among);
+    *is_issued = false;
+    while (turn != NOBODY) {
+        if (!issue(r, r->owners[turn], is_issued)) {
             return false;
         }
-        if (is_issued) {
-            remember_issued(r, chosen);
-            *issued = chosen;
+        if (*is_issued) {
+            remember_issued(r, turn);
             return true;
         }
-        candidates[chosen] = false;
+        remove_from(among, turn);
+        remove_from(&r->candidates, turn);
+        add_to(&r->withheld, turn);
+        turn = choose(r, among);
     }
+    return true;
 }
 
 /* Whether a request is enabled, and no goal of its action is open. */
@@ -149,26 +145,42 @@ static bool may_be_issued(const robot_t *r, int request)
     return is_allowed(&r->state, REQUESTS[request].event);
 }
 
-static void find_enabled(robot_t *r)
+/* Look at the requests that may be enabled now or no longer. */
+static void find_candidates(robot_t *r)
 {
-    for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
-        r->is_enabled[request] = may_be_issued(r, request);
+    for (int number = first_in(&r->stale); number >= 0; number = next_in(&r->stale, number)) {
+        const int request = number - ROBOT_SILENT_COUNT;
+        if (request >= 0) {
+            const int turn = r->turns[request];
+            remove_from(&r->stale, number);
+            if (!may_be_issued(r, request)) {
+                remove_from(&r->candidates, turn);
+            } else if (!is_in(&r->candidates, turn)) {
+                add_to(&r->candidates, turn);
+                add_to(&r->fresh, turn);
+            }
+        }
     }
-    r->is_enabled_known = true;
 }
 
 #if ROBOT_TOPIC_COUNT > 0
-/* True if the message of a request ends a release that waits. */
-static bool is_ending(const robot_t *r, int request)
+/* The candidates whose message ends a release that waits. */
+static void find_ending(const robot_t *r, robot_set_t *ending)
 {
-    const int topic = REQUESTS[request].topic;
-    return topic >= 0 && r->acting[topic].is_waiting && r->acting[topic].request != request;
+    memset(ending, 0, sizeof *ending);
+    for (int topic = first_in(&r->acting_topics); topic >= 0; topic = next_in(&r->acting_topics, topic)) {
+        if (r->acting[topic].is_waiting) {
+            const int sender = r->acting[topic].request;
+            for (int request = REQUESTS[sender].next; request != sender; request = REQUESTS[request].next) {
+                if (is_in(&r->candidates, r->turns[request])) {
+                    add_to(ending, r->turns[request]);
+                }
+            }
+        }
+    }
 }
 
 #endif
-
-static uint64_t next_deadline(const robot_t *r);
-
 #if ROBOT_HAS_STRATEGY
 /* The request that the strategy chooses, or -1 to wait. */
 static int choose_strategically(robot_t *r)
@@ -189,13 +201,14 @@ static bool decide_strategically(robot_t *r)
 {
     bool is_issued = false;
     int request = r->candidate;
-    if (!r->is_enabled_known) {
+    if (!r->is_choice_known) {
         request = r->candidate = choose_strategically(r);
-        r->is_enabled_known = true;
+        r->is_choice_known = true;
     }
 #if ROBOT_TOPIC_COUNT > 0
-    if (is_any_waiting(r)) {
-        if (request >= 0 && is_ending(r, request)) {
+    if (r->waiting_count > 0) {
+        const int topic = request < 0 ? -1 : REQUESTS[request].topic;
+        if (topic >= 0 && r->acting[topic].is_waiting && r->acting[topic].request != request) {
             if (!issue(r, request, &is_issued)) {
                 return false;
             }
@@ -213,59 +226,33 @@ static bool decide_strategically(robot_t *r)
     if (request < 0) {
         return true;
     }
-    if (!issue(r, request, &is_issued)) {
-        return false;
-    }
-    if (is_issued && REQUESTS[request].topic < 0) {
-        r->deadline_us = next_deadline(r);
-    }
-    return true;
+    return issue(r, request, &is_issued);
 }
 
 #endif
 /* One decision. */
 static bool decide(robot_t *r)
 {
-    bool enabled[ROBOT_REQUEST_COUNT];
-    bool candidates[ROBOT_REQUEST_COUNT];
-    int issued = -1;
+    bool is_issued = false;
 #if ROBOT_HAS_STRATEGY
     if (r->settings.policy == ROBOT_POLICY_STRATEGY) {
         return decide_strategically(r);
     }
 #endif
-    if (!r->is_enabled_known) {
-        find_enabled(r);
-    }
-    for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
-        enabled[request] = r->is_enabled[request];
-        candidates[request] = enabled[request];
-    }
+    find_candidates(r);
 #if ROBOT_TOPIC_COUNT > 0
-    if (is_any_waiting(r)) {
-        bool others[ROBOT_REQUEST_COUNT];
-        for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
-            others[request] = candidates[request] && !is_ending(r, request);
-            candidates[request] = candidates[request] && is_ending(r, request);
-        }
-        if (!issue_one_of(r, candidates, &issued)) {
+    if (r->waiting_count > 0) {
+        robot_set_t ending;
+        find_ending(r, &ending);
+        if (!issue_one_of(r, &ending, &is_issued)) {
             return false;
         }
-        if (issued < 0 && !issue_one_of(r, others, &issued)) {
-            return false;
-        }
-    } else
+    }
 #endif
-        if (!issue_one_of(r, candidates, &issued)) {
-            return false;
-        }
-    for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
-        r->was_enabled[request] = enabled[request];
+    if (!is_issued && !issue_one_of(r, &r->candidates, &is_issued)) {
+        return false;
     }
-    r->decision++;
-    if (issued >= 0 && REQUESTS[issued].topic < 0) {
-        r->deadline_us = next_deadline(r);
-    }
+    end_decision(r);
     return true;
 }
 #endif

@@ -242,6 +242,14 @@ typedef struct {
 } robot_item_t;
 
 #endif
+#if ROBOT_SET_COUNT > 0
+/* Set of numbers: the bit of each, and of each word of these that is not zero. */
+typedef struct {
+    uint32_t used[(ROBOT_SET_COUNT + 1023) / 1024];
+    uint32_t bits[(ROBOT_SET_COUNT + 31) / 32];
+} robot_set_t;
+
+#endif
 typedef struct {
     int request; /* -1: nothing acts */
     uint64_t sent;
@@ -311,10 +319,9 @@ typedef struct {
     robot_counters_t counters;
     robot_settings_t settings;
     robot_callbacks_t callbacks;
-    robot_state_t stable;
-    bool has_stable;
-#if !ROBOT_IS_LAYER
-    bool is_enabled_known;
+    bool is_stable; /* no silent step is enabled in this state, and what follows from it was done */
+#if ROBOT_STALE_COUNT > 0
+    robot_set_t stale; /* silent steps, then requests, that may be allowed now or no longer */
 #endif
     bool is_pending;
     bool is_started;
@@ -335,12 +342,18 @@ typedef struct {
     uint32_t next_call_id;
     uint32_t next_goal_id;
 #if !ROBOT_IS_LAYER
+#if ROBOT_REQUEST_COUNT > 0
     int64_t decision;
-    int64_t issued[ROBOT_REQUEST_COUNT + 1];
-    int64_t favoured[ROBOT_REQUEST_COUNT + 1];
-    bool was_enabled[ROBOT_REQUEST_COUNT + 1];
-    bool is_enabled[ROBOT_REQUEST_COUNT + 1];
-    bool is_unchanging[ROBOT_REQUEST_COUNT + 1];
+    int64_t favoured[ROBOT_REQUEST_COUNT]; /* the decision at which a request was last issued for being new */
+    int32_t turns[ROBOT_REQUEST_COUNT];    /* by request: the one with the least goes first */
+    int32_t owners[2 * ROBOT_REQUEST_COUNT]; /* the request that has each turn, or -1 */
+    int next_turn;
+    int listed_count;       /* number of requests in the list of the policy `priority`, which have the first turns */
+    robot_set_t candidates; /* turns of the requests that may be issued */
+    robot_set_t fresh;      /* those of them that could not be at the last decision */
+    robot_set_t withheld;   /* turns of requests that turned out at this decision to have no data, or unfit */
+    robot_set_t unchanging; /* requests that were issued in this stable state and changed nothing */
+#endif
 #else
     uint64_t arrived_us[ROBOT_TOPIC_COUNT + 1];
 #endif
@@ -349,11 +362,18 @@ typedef struct {
     uint32_t seen[(ROBOT_AIM_COUNT + ROBOT_ASSUMPTION_COUNT + ROBOT_VISIT_COUNT + ROBOT_MISSION_COUNT + 31) / 32];
     uint32_t reported[(ROBOT_AIM_COUNT + ROBOT_ASSUMPTION_COUNT + 31) / 32];
     bool has_observed;
+    bool is_choice_known; /* the strategy was asked in this stable state */
     int approached;
     int chosen;
     int candidate;
 #endif
     robot_acting_t acting[ROBOT_TOPIC_COUNT + 1];
+#if ROBOT_TOPIC_COUNT > 0
+    robot_set_t acting_topics; /* those where something acts */
+#if !ROBOT_IS_LAYER
+    int waiting_count; /* number of those where a release waits */
+#endif
+#endif
 #if ROBOT_LIMIT_COUNT > 0
     double numbers[ROBOT_NUMBER_COUNT]; /* of the request under way */
     int moved;
@@ -362,6 +382,7 @@ typedef struct {
     robot_call_t calls[ROBOT_SERVICE_COUNT + 1];
 #if ROBOT_ACTION_COUNT > 0
     robot_goal_t goals[ROBOT_ACTION_COUNT];
+    robot_set_t open_goals; /* actions with a goal that has not ended */
 #endif
     robot_sensor_t sensors[ROBOT_SENSOR_COUNT + 1];
 } robot_t;

@@ -19,6 +19,7 @@ static void open_call(robot_t *r, robot_call_t *call)
     call->is_old = false;
     call->id = r->next_call_id++;
     call->deadline_us = later(r->now_us, r->settings.service_timeout_us);
+    wake_at(r, call->deadline_us);
 }
 #endif
 
@@ -27,36 +28,49 @@ static void open_call(robot_t *r, robot_call_t *call)
 
 static bool is_any_goal_open(const robot_t *r)
 {
-    for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
-        if (r->goals[action].is_open) {
+    return first_in(&r->open_goals) >= 0;
+}
+
+/* Return true if a goal from before a restart has not ended. */
+static bool is_any_goal_old(const robot_t *r)
+{
+    for (int action = first_in(&r->open_goals); action >= 0; action = next_in(&r->open_goals, action)) {
+        if (r->goals[action].cancelling.is_old) {
             return true;
         }
     }
     return false;
 }
 
-/* Return true if a goal from before a restart has not ended. */
-static bool is_any_goal_old(const robot_t *r)
+/* Note whether an action has a goal that has not ended. While it has one, it is not requested. */
+static void set_open(robot_t *r, int action, bool is_open)
 {
-    for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
-        if (r->goals[action].is_open && r->goals[action].cancelling.is_old) {
-            return true;
-        }
+    r->goals[action].is_open = is_open;
+    if (is_open) {
+        add_to(&r->open_goals, action);
+    } else {
+        remove_from(&r->open_goals, action);
     }
-    return false;
+#if ROBOT_HAS_STRATEGY
+    r->is_choice_known = false;
+#endif
+#if !ROBOT_IS_LAYER
+    add_to(&r->stale, ROBOT_SILENT_COUNT + ACTIONS[action].request);
+#endif
 }
 
 /* Begin a goal with a new id and the requirements that hold now. */
 static robot_goal_t *open_goal(robot_t *r, int action)
 {
     robot_goal_t *goal = &r->goals[action];
-    goal->is_open = true;
+    set_open(r, action, true);
     goal->is_running = true;
     goal->is_accepted = false;
     goal->is_cancel_sent = false;
     memset(&goal->cancelling, 0, sizeof goal->cancelling);
     goal->id = r->next_goal_id++;
     goal->deadline_us = later(r->now_us, r->settings.action_timeout_us);
+    wake_at(r, goal->deadline_us);
     get_requirements(&r->state, action, goal->held);
     return goal;
 }
@@ -87,9 +101,7 @@ static void begin_cancel(robot_t *r, int action, robot_cancel_t why)
     if (goal->is_open && goal->cancelling.why == ROBOT_CANCEL_NONE) {
         goal->cancelling.why = why;
         goal->cancelling.asked_us = r->now_us;
-        if (overdue_from(r, action) < r->deadline_us) {
-            r->deadline_us = overdue_from(r, action);
-        }
+        wake_at(r, overdue_from(r, action));
         note(r, ROBOT_LOG_CANCELLING, (int)ACTIONS[action].communication);
     }
 }
@@ -110,9 +122,9 @@ static bool request_cancel(robot_t *r, int action)
 
 static void observe_goals(robot_t *r)
 {
-    for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
+    for (int action = first_in(&r->open_goals); action >= 0; action = next_in(&r->open_goals, action)) {
         robot_goal_t *goal = &r->goals[action];
-        if (goal->is_open && goal->is_running) {
+        if (goal->is_running) {
             bool holds[ROBOT_REQUIREMENT_COUNT + 1] = {false};
             get_requirements(&r->state, action, holds);
             for (int place = 0; place < ACTIONS[action].requirements; place++) {
@@ -126,9 +138,9 @@ static void observe_goals(robot_t *r)
    whether or not the supervisor allows the event now: the goal's error can always follow. */
 static bool cancel_turned(robot_t *r)
 {
-    for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
+    for (int action = first_in(&r->open_goals); action >= 0; action = next_in(&r->open_goals, action)) {
         robot_goal_t *goal = &r->goals[action];
-        if (goal->is_open && goal->is_running && goal->cancelling.why == ROBOT_CANCEL_NONE) {
+        if (goal->is_running && goal->cancelling.why == ROBOT_CANCEL_NONE) {
             bool holds[ROBOT_REQUIREMENT_COUNT + 1] = {false};
             bool has_turned = false;
             get_requirements(&r->state, action, holds);

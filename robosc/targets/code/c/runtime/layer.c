@@ -83,9 +83,6 @@ static int take_request(robot_t *r, int request, const robot_sent_t *sent_by_cal
     if (!take(r, REQUESTS[request].event) || !settle(r, request, &has_changed)) {
         return (int)ROBOT_REFUSAL_FAULT;
     }
-    /* The outgoing request may set a new deadline: looked up as soon as the clock is read again.
-       */
-    r->deadline_us = r->now_us;
     return LET_THROUGH;
 }
 
@@ -131,6 +128,7 @@ static void let_message_through(robot_t *r, int topic, int request, int why, con
 #else
             sent(r, request, sent_by_caller->is_default);
 #endif
+            wake_at(r, silent_from(r, topic));
         }
         if (!r->callbacks.publish(r->callbacks.context, (robot_topic_t)topic, sent_by_caller->message)) {
             why = failed(r);
@@ -202,7 +200,7 @@ static int send_goal(robot_t *r, int request, uint32_t caller_id, const void *me
     goal->is_cancelled_by_caller = false;
     goal->caller_id = caller_id;
     if (!callbacks->send_goal(callbacks->context, goal->id, action, message)) {
-        goal->is_open = false;
+        set_open(r, REQUESTS[request].action, false);
         return failed(r);
     }
     if (!callbacks->accept_goal(callbacks->context, action, caller_id)) {

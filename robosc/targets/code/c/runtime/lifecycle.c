@@ -22,24 +22,18 @@ static bool begin(robot_t *r)
 #if !ROBOT_IS_LAYER
 #if ROBOT_REQUEST_COUNT > 0
     new_policy(r);
-    for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
-        r->is_unchanging[request] = false;
-    }
 #endif
 #endif
     set_initial(&r->state);
 #if ROBOT_HAS_STRATEGY
     forget_progress(r);
 #endif
-    r->has_stable = false;
-#if !ROBOT_IS_LAYER
-    r->is_enabled_known = false;
-#endif
+    all_changed(r);
     r->is_pending = false;
     if (!settle(r, -1, &has_changed)) {
         return false;
     }
-    r->deadline_us = next_deadline(r);
+    find_deadline(r);
     update_may_request(r);
     return true;
 }
@@ -95,11 +89,7 @@ bool robot_init(robot_t *r, const robot_settings_t *settings, const robot_callba
     }
 #if ROBOT_REQUEST_COUNT > 0
     for (int place = 0; place < r->settings.priority_count; place++) {
-        bool is_request = false;
-        for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
-            is_request = is_request || REQUESTS[request].communication == r->settings.priority[place];
-        }
-        if (!is_request) {
+        if (request_of(r->settings.priority[place]) == ROBOT_REQUEST_COUNT) {
             return false;
         }
     }

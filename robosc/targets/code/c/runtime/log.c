@@ -51,6 +51,16 @@ static uint64_t later(uint64_t now_us, uint64_t span_us)
     return span_us > FOREVER - now_us ? FOREVER : now_us + span_us;
 }
 
+#if ROBOT_TIMES > 0
+/* Look at the time at that moment at the latest. */
+static void wake_at(robot_t *r, uint64_t due_us)
+{
+    if (due_us < r->deadline_us) {
+        r->deadline_us = due_us;
+    }
+}
+#endif
+
 #if ROBOT_UNCONTROLLABLE_DATA > 0
 /* Return true if what came counts as having come, although something in it is unknown. */
 static bool notes_count(robot_t *r, robot_event_t event, const notes_t *notes, bool may_keep)
@@ -90,7 +100,7 @@ static void happened(robot_t *r, robot_event_t event, int skipped)
 /* Take an event that is enabled. */
 static bool take(robot_t *r, robot_event_t event)
 {
-    const int skipped = take_event(&r->state, event);
+    const int skipped = take_event(r, event);
     if (skipped == REFUSED) {
         return fault(r, ROBOT_FAULT_REFUSED);
     }

@@ -1,26 +1,75 @@
 #if ROBOT_REQUEST_COUNT > 0
-/* Policies. */
+/* Policies. Each request has a turn, a number; among several, the one with the least goes first. A request that was
+   issued gets the next turn after all others. So the one that goes first is found at once, and there is nothing to be
+   sorted; the turns are numbered anew when they are used up. */
 
+enum {
+    TURN_COUNT = 2 * ROBOT_REQUEST_COUNT,
+    NOBODY = -1 /* instead of a request, or of a turn's owner */
+};
+
+/* The request of a communication. */
+static int request_of(robot_communication_t communication)
+{
+    int request = 0;
+    while (request < ROBOT_REQUEST_COUNT && REQUESTS[request].communication != communication) {
+        request++;
+    }
+    return request;
+}
+
+/* A request gets the next turn after all others. */
+static void give_turn(robot_t *r, int request)
+{
+    r->turns[request] = r->next_turn;
+    r->owners[r->next_turn] = request;
+    r->next_turn++;
+}
+
+/* In the beginning the list of the policy `priority` comes first, and then all others in source order. */
 static void new_policy(robot_t *r)
 {
+    const int listed_count = r->settings.policy == ROBOT_POLICY_PRIORITY ? r->settings.priority_count : 0;
     r->decision = 0;
-    r->is_new = false;
     r->random = r->settings.seed;
+    r->next_turn = 0;
+    empty(&r->candidates);
+    empty(&r->fresh);
+    empty(&r->withheld);
+    empty(&r->unchanging);
     for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
-        r->was_enabled[request] = false;
-        r->issued[request] = -1;
+        r->turns[request] = NOBODY;
         r->favoured[request] = -ROBOT_REQUEST_COUNT;
+    }
+    for (int place = 0; place < listed_count; place++) {
+        const int request = request_of(r->settings.priority[place]);
+        if (r->turns[request] == NOBODY) {
+            give_turn(r, request);
+        }
+    }
+    r->listed_count = r->next_turn;
+    for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
+        if (r->turns[request] == NOBODY) {
+            give_turn(r, request);
+        }
     }
 }
 
-static bool is_listed(const robot_t *r, int request)
+/* Number the turns anew, in the same order. Between decisions nothing but `candidates` has any. */
+static void renumber_turns(robot_t *r)
 {
-    for (int place = 0; place < r->settings.priority_count; place++) {
-        if (r->settings.priority[place] == REQUESTS[request].communication) {
-            return true;
+    r->next_turn = 0;
+    for (int turn = 0; turn < TURN_COUNT; turn++) {
+        const int request = r->owners[turn];
+        if (request != NOBODY) {
+            if (is_in(&r->candidates, turn)) {
+                remove_from(&r->candidates, turn);
+                add_to(&r->candidates, r->next_turn);
+            }
+            r->owners[turn] = NOBODY;
+            give_turn(r, request);
         }
     }
-    return false;
 }
 
 /* The splitmix64 generator (Steele, Lea and Flood, OOPSLA 2014). */
@@ -33,73 +82,78 @@ static int next_random(robot_t *r, int count)
     return (int)(((z >> 32) * (uint64_t)count) >> 32);
 }
 
-static int choose_random(robot_t *r, const bool *candidates)
+/* Where chance decides, no request ever gets another turn: they are in source order. */
+static int choose_random(robot_t *r, const robot_set_t *among)
 {
-    int count = 0;
     int left = 0;
-    int request = 0;
-    for (int place = 0; place < ROBOT_REQUEST_COUNT; place++) {
-        count += candidates[place] ? 1 : 0;
-    }
-    left = next_random(r, count);
-    for (request = 0; request < ROBOT_REQUEST_COUNT - 1; request++) {
-        if (candidates[request]) {
-            if (left == 0) {
-                break;
-            }
-            left--;
+    for (int word = 0; word < SET_WORDS; word++) {
+        for (uint32_t bits = among->bits[word]; bits != 0; bits &= bits - 1) {
+            left++;
         }
     }
-    return request;
+    if (left > 0) {
+        left = next_random(r, left);
+        for (int word = 0; word < SET_WORDS; word++) {
+            for (uint32_t bits = among->bits[word]; bits != 0; bits &= bits - 1) {
+                if (left == 0) {
+                    return 32 * word + lowest_bit(bits);
+                }
+                left--;
+            }
+        }
+    }
+    return NOBODY;
 }
 
-/* Newly enabled requests first, each at most once in as many decisions as there are requests; then the longest-ago
-   issued, never-issued first, source order. */
-static int choose_fair(robot_t *r, const bool *candidates)
+/* The turn that comes first among some, or NOBODY. Newly enabled requests are preferred, each at most once in as many
+   decisions as there are requests; but those of the list go before. */
+static int choose_turn(robot_t *r, const robot_set_t *among)
 {
-    int best = -1;
-    bool is_best_new = false;
-    for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
-        if (candidates[request]) {
-            const bool is_new
-                = !r->was_enabled[request] && r->favoured[request] <= r->decision - ROBOT_REQUEST_COUNT;
-            if (best < 0 || (is_new && !is_best_new)) {
-                best = request;
-                is_best_new = is_new;
-            } else if (is_new == is_best_new && r->issued[request] < r->issued[best]) {
-                best = request;
-            }
+    const int best = first_in(among);
+    r->is_new = false;
+    if (best < r->listed_count) {
+        return best;
+    }
+    for (int turn = first_in(&r->fresh); turn >= 0; turn = next_in(&r->fresh, turn)) {
+        if (is_in(among, turn) && r->favoured[r->owners[turn]] <= r->decision - ROBOT_REQUEST_COUNT) {
+            r->is_new = true;
+            return turn;
         }
     }
-    r->is_new = is_best_new;
     return best;
 }
 
-static int choose(robot_t *r, const bool *candidates)
+/* One of the turns of some candidates, or NOBODY where there is none. */
+static int choose(robot_t *r, const robot_set_t *among)
 {
-    if (r->settings.policy == ROBOT_POLICY_RANDOM) {
-        return choose_random(r, candidates);
-    }
-    if (r->settings.policy == ROBOT_POLICY_PRIORITY) {
-        for (int place = 0; place < r->settings.priority_count; place++) {
-            for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
-                if (candidates[request] && REQUESTS[request].communication == r->settings.priority[place]) {
-                    return request;
-                }
-            }
-        }
-    }
-    return choose_fair(r, candidates);
+    return r->settings.policy == ROBOT_POLICY_RANDOM ? choose_random(r, among) : choose_turn(r, among);
 }
 
-static void remember_issued(robot_t *r, int request)
+/* The request with a turn was issued. It is a candidate until it turns out that it is none any longer. */
+static void remember_issued(robot_t *r, int turn)
 {
-    const bool is_by_list = r->settings.policy == ROBOT_POLICY_PRIORITY && is_listed(r, request);
-    if (r->settings.policy != ROBOT_POLICY_RANDOM && !is_by_list) {
-        r->issued[request] = r->decision;
+    if (r->settings.policy != ROBOT_POLICY_RANDOM && turn >= r->listed_count) {
+        const int request = r->owners[turn];
         if (r->is_new) {
             r->favoured[request] = r->decision;
         }
+        remove_from(&r->candidates, turn);
+        add_to(&r->candidates, r->next_turn);
+        r->owners[turn] = NOBODY;
+        give_turn(r, request);
+    }
+}
+
+static void end_decision(robot_t *r)
+{
+    for (int turn = first_in(&r->withheld); turn >= 0; turn = next_in(&r->withheld, turn)) {
+        add_to(&r->candidates, turn);
+    }
+    empty(&r->withheld);
+    empty(&r->fresh);
+    r->decision++;
+    if (r->next_turn == TURN_COUNT) {
+        renumber_turns(r);
     }
 }
 #endif

@@ -17,20 +17,6 @@ static uint32_t first_bits(int count, int word)
     return left >= 32 ? UINT32_MAX : left <= 0 ? 0 : (UINT32_C(1) << left) - 1;
 }
 
-/* Number of the lowest bit that is set; there is one. */
-static int lowest_bit(uint32_t bits)
-{
-#ifdef __GNUC__
-    return __builtin_ctzl(bits);
-#else
-    int number = 0;
-    while ((bits >> number & 1U) == 0) {
-        number++;
-    }
-    return number;
-#endif
-}
-
 static bool is_owed_unreported(const robot_t *r, int number)
 {
     return number >= ROBOT_AIM_COUNT && r->has_observed && !is_seen(r->seen, number) && !is_seen(r->reported, number);
@@ -139,14 +125,12 @@ static void note_met(robot_t *r, int word, uint32_t met)
 /* Begin the account in the first stable state: what is met there was not reached. */
 static void begin_progress(robot_t *r, const uint32_t *seen)
 {
-    uint64_t due_us = 0;
     for (int number = 0; number < ITEM_COUNT; number++) {
         r->items[number].since_us = r->now_us;
     }
     memcpy(r->seen, seen, sizeof r->seen);
     r->has_observed = true;
-    due_us = progress_deadline(r);
-    r->deadline_us = due_us < r->deadline_us ? due_us : r->deadline_us;
+    wake_at(r, progress_deadline(r));
 }
 
 /* Take in a stable state. The loops go over what changes alone: the cycle time of the controller. */
@@ -170,8 +154,7 @@ static void observe_progress(robot_t *r)
         }
         if ((unmet & ~aims) != 0 && r->settings.assumption_timeout_us > 0) {
             /* One that was to be reported earlier may be met by now: that costs a look at the time. */
-            const uint64_t due_us = later(r->now_us, r->settings.assumption_timeout_us);
-            r->deadline_us = due_us < r->deadline_us ? due_us : r->deadline_us;
+            wake_at(r, later(r->now_us, r->settings.assumption_timeout_us));
         }
         for (uint32_t left = met; left != 0; left &= left - 1) {
             r->items[32 * word + lowest_bit(left)].count++;

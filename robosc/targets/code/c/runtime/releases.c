@@ -1,11 +1,21 @@
 #if ROBOT_TOPIC_COUNT > 0
 /* Messages that keep acting (releases). */
 
+#if !ROBOT_IS_LAYER
+/* Note whether a release waits for another message on a topic. */
+static void set_waiting(robot_t *r, int topic, bool is_waiting)
+{
+    r->waiting_count += (is_waiting ? 1 : 0) - (r->acting[topic].is_waiting ? 1 : 0);
+    r->acting[topic].is_waiting = is_waiting;
+}
+
+#endif
 static void forget_acting(robot_t *r, int topic)
 {
     r->acting[topic].request = -1;
+    remove_from(&r->acting_topics, topic);
 #if !ROBOT_IS_LAYER
-    r->acting[topic].is_waiting = false;
+    set_waiting(r, topic, false);
 #endif
 }
 
@@ -27,13 +37,12 @@ static bool keeps_acting(const robot_t *r, int request)
 #if !ROBOT_IS_LAYER
 static bool another_is_enabled(const robot_t *r, int topic)
 {
-    for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
-        if (REQUESTS[request].topic == topic && request != r->acting[topic].request
-            && is_allowed(&r->state, REQUESTS[request].event)) {
-            return true;
-        }
+    const int sender = r->acting[topic].request;
+    int request = REQUESTS[sender].next;
+    while (request != sender && !is_allowed(&r->state, REQUESTS[request].event)) {
+        request = REQUESTS[request].next;
     }
-    return false;
+    return request != sender;
 }
 
 #endif
@@ -71,20 +80,18 @@ static void observe_acting(robot_t *r, int topic)
     acting->was_enabled = is_enabled;
 }
 
-/* Release what acts on the topics that are marked, in the order in which it was sent. */
-static bool release_marked(robot_t *r, bool *is_marked)
+/* Release what acts on some topics, in the order in which it was sent. */
+static bool release_all(robot_t *r, robot_set_t *topics)
 {
     for (;;) {
-        int first = -1;
-        for (int topic = 0; topic < ROBOT_TOPIC_COUNT; topic++) {
-            if (is_marked[topic] && (first < 0 || r->acting[topic].sent < r->acting[first].sent)) {
-                first = topic;
-            }
-        }
+        int first = first_in(topics);
         if (first < 0) {
             return true;
         }
-        is_marked[first] = false;
+        for (int topic = next_in(topics, first); topic >= 0; topic = next_in(topics, topic)) {
+            first = r->acting[topic].sent < r->acting[first].sent ? topic : first;
+        }
+        remove_from(topics, first);
         if (!release(r, first)) {
             return false;
         }
@@ -94,52 +101,47 @@ static bool release_marked(robot_t *r, bool *is_marked)
 /* Release what is due in this stable state. */
 static bool judge_releases(robot_t *r, int issuing)
 {
-    bool is_now[ROBOT_TOPIC_COUNT] = {false};
-    bool is_any = false;
-    for (int topic = 0; topic < ROBOT_TOPIC_COUNT; topic++) {
-        robot_acting_t *acting = &r->acting[topic];
-        if (acting->request >= 0) {
-#if !ROBOT_IS_LAYER
-            acting->is_waiting = false;
-#endif
-            if (acting->request != issuing) {
-                observe_acting(r, topic);
+    robot_set_t due;
+    int topic = first_in(&r->acting_topics);
+    if (topic < 0) {
+        return true;
+    }
+    memset(&due, 0, sizeof due);
+    for (; topic >= 0; topic = next_in(&r->acting_topics, topic)) {
+        const robot_acting_t *acting = &r->acting[topic];
 #if ROBOT_IS_LAYER
-                is_now[topic] = acting->is_due;
-#else
-                if (acting->is_due) {
-                    acting->is_waiting = another_is_enabled(r, topic);
-                    is_now[topic] = !acting->is_waiting;
-                }
-#endif
-                is_any = is_any || is_now[topic];
+        if (acting->request != issuing) {
+            observe_acting(r, topic);
+            if (acting->is_due) {
+                add_to(&due, topic);
             }
         }
-    }
-    return !is_any || release_marked(r, is_now);
-}
-
-#if !ROBOT_IS_LAYER
-static bool is_any_waiting(const robot_t *r)
-{
-    for (int topic = 0; topic < ROBOT_TOPIC_COUNT; topic++) {
-        if (r->acting[topic].is_waiting) {
-            return true;
+#else
+        bool is_waiting = false;
+        if (acting->request != issuing) {
+            observe_acting(r, topic);
+            is_waiting = acting->is_due && another_is_enabled(r, topic);
+            if (acting->is_due && !is_waiting) {
+                add_to(&due, topic);
+            }
         }
+        set_waiting(r, topic, is_waiting);
+#endif
     }
-    return false;
+    return release_all(r, &due);
 }
 
-#endif
 #if ROBOT_HAS_STRATEGY
 /* Release what waits for a message that does not come. */
 static bool release_waiting(robot_t *r)
 {
-    bool is_now[ROBOT_TOPIC_COUNT] = {false};
-    for (int topic = 0; topic < ROBOT_TOPIC_COUNT; topic++) {
-        is_now[topic] = r->acting[topic].is_waiting;
+    robot_set_t waiting = r->acting_topics;
+    for (int topic = first_in(&waiting); topic >= 0; topic = next_in(&waiting, topic)) {
+        if (!r->acting[topic].is_waiting) {
+            remove_from(&waiting, topic);
+        }
     }
-    return release_marked(r, is_now);
+    return release_all(r, &waiting);
 }
 
 #endif
@@ -150,6 +152,7 @@ static void sent(robot_t *r, int request, bool is_default)
     forget_acting(r, topic);
     if (!is_default) {
         acting->request = request;
+        add_to(&r->acting_topics, topic);
         acting->is_due = false;
         acting->sent = r->sent_count++;
         acting->was_enabled = is_allowed(&r->state, REQUESTS[request].event);

@@ -30,17 +30,22 @@ static void guard(robot_t *r, bool is_well)
 
 #if ROBOT_SENSOR_COUNT > 0
 /* A message came: its sensor is fresh, and a stop because it was not is over. */
-static void see(robot_t *r, int sensor)
+static void see(robot_t *r, int index)
 {
-    if (r->settings.max_age_us[SENSORS[sensor]] > 0) {
-        r->sensors[sensor].seen_us = r->now_us;
-        r->sensors[sensor].was_seen = true;
-        if (r->sensors[sensor].is_stale) {
-            r->sensors[sensor].is_stale = false;
-            note(r, ROBOT_LOG_RESUME, (int)SENSORS[sensor]);
-            r->deadline_us = next_deadline(r);
+    robot_sensor_t *sensor = &r->sensors[index];
+    const uint64_t max_age_us = r->settings.max_age_us[SENSORS[index]];
+    if (max_age_us > 0) {
+        const bool is_news = sensor->is_stale || !sensor->was_seen;
+        sensor->seen_us = r->now_us;
+        sensor->was_seen = true;
+        if (sensor->is_stale) {
+            sensor->is_stale = false;
+            note(r, ROBOT_LOG_RESUME, (int)SENSORS[index]);
+            wake_at(r, later(r->now_us, max_age_us));
         }
-        update_may_request(r);
+        if (is_news) {
+            update_may_request(r);
+        }
     }
 }
 #endif
@@ -55,7 +60,9 @@ static bool close_call(robot_t *r, int service, uint32_t id)
         return false;
     }
     call->is_open = false;
-    update_may_request(r);
+    if (call->is_old) {
+        update_may_request(r);
+    }
     return true;
 }
 
@@ -67,7 +74,7 @@ void robot_call_failed(robot_t *r, uint64_t now_us, uint32_t id)
         found = r->calls[service].is_open && r->calls[service].id == id ? service : found;
     }
     if (close_call(r, found, id) && !r->calls[found].is_old) {
-        happened(r, SERVICES[found].error, take_event(&r->state, SERVICES[found].error));
+        happened(r, SERVICES[found].error, take_event(r, SERVICES[found].error));
         guard(r, end_batch(r));
     }
 #if ROBOT_IS_LAYER
@@ -80,8 +87,8 @@ void robot_call_failed(robot_t *r, uint64_t now_us, uint32_t id)
 /* The action whose open goal has an id, or -1. */
 static int find_goal(robot_t *r, uint32_t id)
 {
-    for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
-        if (r->goals[action].is_open && r->goals[action].id == id) {
+    for (int action = first_in(&r->open_goals); action >= 0; action = next_in(&r->open_goals, action)) {
+        if (r->goals[action].id == id) {
             return action;
         }
     }
@@ -102,11 +109,10 @@ static bool has_goal(robot_t *r, int action, uint32_t id)
 /* The end of a goal is known: its action may be requested again. */
 static void close_goal(robot_t *r, int action)
 {
-    r->goals[action].is_open = false;
-    update_may_request(r);
-#if !ROBOT_IS_LAYER
-    r->is_enabled_known = false;
-#endif
+    set_open(r, action, false);
+    if (r->goals[action].cancelling.is_old) {
+        update_may_request(r);
+    }
 }
 
 void robot_goal_accepted(robot_t *r, uint64_t now_us, uint32_t id)
@@ -135,7 +141,7 @@ static bool take_end(robot_t *r, int action, robot_outcome_t outcome)
     if (outcome == ROBOT_OUTCOME_CANCELLED && is_own && is_allowed(&r->state, ACTIONS[action].cancel)) {
         return take(r, ACTIONS[action].cancel);
     }
-    happened(r, ACTIONS[action].error, take_event(&r->state, ACTIONS[action].error));
+    happened(r, ACTIONS[action].error, take_event(r, ACTIONS[action].error));
     return true;
 }
 

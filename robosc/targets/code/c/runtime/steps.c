@@ -12,10 +12,11 @@ static bool silent_step(robot_t *r, bool *has_stepped)
     }
 #endif
 #if ROBOT_SILENT_COUNT > 0
-    for (int place = 0; place < ROBOT_SILENT_COUNT; place++) {
+    for (int place = first_in(&r->stale); place >= 0 && place < ROBOT_SILENT_COUNT; place = next_in(&r->stale, place)) {
         if (is_allowed(&r->state, SILENT[place])) {
             return take(r, SILENT[place]);
         }
+        remove_from(&r->stale, place);
     }
 #endif
     *has_stepped = false;
@@ -56,26 +57,24 @@ static bool run_on(robot_t *r)
     return true;
 }
 
-/* Silent steps to the end; then releases and running goals are judged, if the stable state is another one. */
+/* Silent steps to the end; then releases and running goals are judged, if the stable state may be another one. */
 static bool settle(robot_t *r, int issuing, bool *has_changed)
 {
-    *has_changed = !r->has_stable || !is_same_state(&r->state, &r->stable);
+    *has_changed = !r->is_stable;
     if (*has_changed) {
         bool has_stepped = false;
-        r->has_stable = false;
+#if ROBOT_HAS_STRATEGY
+        r->is_choice_known = false;
+#endif
 #if !ROBOT_IS_LAYER
-        r->is_enabled_known = false;
 #if ROBOT_REQUEST_COUNT > 0
-        for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
-            r->is_unchanging[request] = false;
-        }
+        empty(&r->unchanging);
 #endif
 #endif
         if (!silent_step(r, &has_stepped) || (has_stepped && !run_on(r))) {
             return false;
         }
-        r->stable = r->state;
-        r->has_stable = true;
+        r->is_stable = true;
 #if ROBOT_HAS_STRATEGY
         observe_progress(r);
 #endif

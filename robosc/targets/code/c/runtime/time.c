@@ -18,51 +18,42 @@ static void update_may_request(robot_t *r)
 #endif
 }
 
-static uint64_t next_deadline(const robot_t *r)
+/* Find the time at which something is over next. */
+static void find_deadline(robot_t *r)
 {
-    uint64_t next = FOREVER;
+    r->deadline_us = FOREVER;
 #if ROBOT_SERVICE_COUNT > 0
     for (int service = 0; service < ROBOT_SERVICE_COUNT; service++) {
-        if (r->calls[service].is_open && r->calls[service].deadline_us < next) {
-            next = r->calls[service].deadline_us;
+        if (r->calls[service].is_open) {
+            wake_at(r, r->calls[service].deadline_us);
         }
     }
 #endif
 #if ROBOT_ACTION_COUNT > 0
-    for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
-        if (time_is_over_from(r, action) < next) {
-            next = time_is_over_from(r, action);
-        }
-        if (overdue_from(r, action) < next) {
-            next = overdue_from(r, action);
-        }
+    for (int action = first_in(&r->open_goals); action >= 0; action = next_in(&r->open_goals, action)) {
+        wake_at(r, time_is_over_from(r, action));
+        wake_at(r, overdue_from(r, action));
     }
 #endif
 #if ROBOT_SENSOR_COUNT > 0
     for (int sensor = 0; sensor < ROBOT_SENSOR_COUNT; sensor++) {
         const uint64_t max_age_us = r->settings.max_age_us[SENSORS[sensor]];
         const uint64_t age = later(r->sensors[sensor].seen_us, max_age_us);
-        if (max_age_us > 0 && age > r->now_us && age < next) {
-            next = age;
+        if (max_age_us > 0 && age > r->now_us) {
+            wake_at(r, age);
         }
     }
 #endif
 #if ROBOT_HAS_STRATEGY
-    if (progress_deadline(r) < next) {
-        next = progress_deadline(r);
-    }
+    wake_at(r, progress_deadline(r));
 #endif
 #if ROBOT_IS_LAYER
 #if ROBOT_TOPIC_COUNT > 0
-    for (int topic = 0; topic < ROBOT_TOPIC_COUNT; topic++) {
-        if (r->acting[topic].request >= 0 && silent_from(r, topic) < next) {
-            next = silent_from(r, topic);
-        }
+    for (int topic = first_in(&r->acting_topics); topic >= 0; topic = next_in(&r->acting_topics, topic)) {
+        wake_at(r, silent_from(r, topic));
     }
 #endif
 #endif
-    (void)r;
-    return next;
 }
 
 /* Replies that did not come in time. */
@@ -86,7 +77,7 @@ static bool expire(robot_t *r)
         }
         r->calls[first].is_open = false;
         if (!r->calls[first].is_old) {
-            happened(r, SERVICES[first].error, take_event(&r->state, SERVICES[first].error));
+            happened(r, SERVICES[first].error, take_event(r, SERVICES[first].error));
             if (!settle(r, -1, &has_changed)) {
                 return false;
             }
@@ -97,7 +88,7 @@ static bool expire(robot_t *r)
     for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
         if (r->now_us >= time_is_over_from(r, action)) {
             r->goals[action].is_running = false;
-            happened(r, ACTIONS[action].error, take_event(&r->state, ACTIONS[action].error));
+            happened(r, ACTIONS[action].error, take_event(r, ACTIONS[action].error));
             if (!settle(r, -1, &has_changed)) {
                 return false;
             }
@@ -122,11 +113,13 @@ static bool check_time(robot_t *r)
 {
 #if ROBOT_IS_LAYER
 #if ROBOT_TOPIC_COUNT > 0
-    bool is_silent[ROBOT_TOPIC_COUNT];
-    for (int topic = 0; topic < ROBOT_TOPIC_COUNT; topic++) {
-        is_silent[topic] = r->acting[topic].request >= 0 && r->now_us >= silent_from(r, topic);
+    robot_set_t silent = r->acting_topics;
+    for (int topic = first_in(&silent); topic >= 0; topic = next_in(&silent, topic)) {
+        if (r->now_us < silent_from(r, topic)) {
+            remove_from(&silent, topic);
+        }
     }
-    if (!release_marked(r, is_silent)) {
+    if (!release_all(r, &silent)) {
         return false;
     }
 #endif
@@ -149,7 +142,7 @@ static bool check_time(robot_t *r)
         }
     }
 #endif
-    r->deadline_us = next_deadline(r);
+    find_deadline(r);
 #if ROBOT_IS_LAYER
     /* Calls and goals that are over end for the caller before all that comes at the same moment.
        */

@@ -1,7 +1,6 @@
 """Synthesis of the maximally permissive supervisor: encoding, fixed point, added conditions, figures."""
 
 from collections.abc import Callable
-from typing import Any
 
 from robosc.automata.structure import System
 from robosc.supervisor import AddedCondition, DecisionDiagram
@@ -92,15 +91,15 @@ class _Synthesis:
         states = count_models(self._manager, reachable, self._encoding.state_names)
         added: list[AddedCondition] = []
         simplifier = Simplifier(self._encoding, self._place.condition_seconds)
+        controlled = ControlledSystem(self._encoding, self._monitor, self._problem, good.states, reachable)
         for steps in self._problem.steps:
             self._monitor.check_stop()
-            condition = self._added(simplifier, steps, good.states, reachable)
+            condition = self._added(simplifier, steps, controlled)
             if condition is not None:
                 added.append(AddedCondition(steps.event.name, condition))
         initial = simplifier.condition(good.states, fixed_point.initial)
         # The figures are those of the synthesis: what the questions take on top is not in them.
         statistics = self._statistics(good, states, closure)
-        controlled = ControlledSystem(self._encoding, self._monitor, self._problem, good.states, reachable)
         return SynthesisResult(
             SynthesisStatus.SUPERVISOR,
             tuple(added),
@@ -120,8 +119,9 @@ class _Synthesis:
             closure=closure,
         )
 
-    def _added(self, simplifier: Simplifier, steps: Steps, good: Any, reachable: Any) -> DecisionDiagram | None:
+    def _added(self, simplifier: Simplifier, steps: Steps, controlled: ControlledSystem) -> DecisionDiagram | None:
         """The condition to add to an event, simplified where it does not matter; None if there is nothing to add."""
-        if not steps.event.is_controllable:
+        if not controlled.is_disabled(steps):
             return None
-        return simplifier.condition(steps.only(good), reachable & steps.plant & steps.condition)
+        only = controlled.conjuncts.only(steps)
+        return simplifier.condition(only, controlled.reachable & steps.plant & steps.condition)

@@ -23,13 +23,17 @@ MAXIMUM_EFFORT = 300_000
 
 @dataclass(eq=False)
 class ControlledSystem(SolvedProblem):
-    """The system under its supervisor."""
+    """The system under its supervisor.
+
+    Attributes:
+        conjuncts: Conjuncts of its good states.
+    """
 
     def __post_init__(self) -> None:
         self._manager = self.encoding.manager
         self._steps = {steps.event.name: steps for steps in self.problem.steps}
         self._causes = Causes(self.encoding, self.monitor, self.problem, self.good, self.reachable)
-        self._conjuncts = Conjuncts(self)
+        self.conjuncts = Conjuncts(self)
         self._effort = 0
 
     def answers(self, questions: Questions) -> Answers:
@@ -41,7 +45,7 @@ class ControlledSystem(SolvedProblem):
         """
         return Answers(
             never=tuple(self._never(questions.events)),
-            unused=UnusedRestrictions(self, self._conjuncts).among(questions.restrictions),
+            unused=UnusedRestrictions(self, self.conjuncts).among(questions.restrictions),
             together=self._together(questions.rivals),
             unreached=tuple(self._unreached(questions.locations)),
             unprompted=tuple(self._unprompted(questions)),
@@ -50,7 +54,13 @@ class ControlledSystem(SolvedProblem):
     def _possible(self, event: str) -> Any:
         """A predicate that is true of those states of the controlled system in which an event can happen."""
         self.monitor.check_stop()
-        return self._conjuncts.possible(self._steps[event])
+        return self.conjuncts.possible(self._steps[event])
+
+    def is_disabled(self, steps: Steps) -> bool:
+        """Return True if the supervisor disables an event in some state where its plants and conditions allow it."""
+        if not steps.event.is_controllable:
+            return False
+        return self._is_reached(steps.plant & steps.condition & ~self.conjuncts.only(steps))
 
     def _is_reached(self, states: Any) -> bool:
         self.monitor.check_stop()

@@ -210,15 +210,15 @@ class _Synthesis:
         states = count_models(self._encoding.manager, reachable, self._encoding.state_names)
         added: list[AddedCondition] = []
         simplifier = Simplifier(self._encoding, self._place.condition_seconds)
+        controlled = ControlledSystem(self._encoding, self._monitor, self._problem, good.states, reachable)
         for steps in self._problem.steps:
             self._monitor.check_stop()
-            condition = self._added(simplifier, steps)
+            condition = self._added(simplifier, steps, controlled)
             if condition is not None:
                 added.append(AddedCondition(steps.event.name, condition))
         initial = simplifier.condition(good.states, self._attempt.fixed_point.initial)
         # The figures are those of the synthesis: what the questions take on top is not in them.
         statistics = self._statistics(states)
-        controlled = ControlledSystem(self._encoding, self._monitor, self._problem, good.states, reachable)
         return SynthesisResult(
             SynthesisStatus.SUPERVISOR,
             tuple(added),
@@ -240,9 +240,9 @@ class _Synthesis:
             closure=closure_in(self._encoding.manager, is_reordering=self._place.is_reordering),
         )
 
-    def _added(self, simplifier: Simplifier, steps: Steps) -> DecisionDiagram | None:
+    def _added(self, simplifier: Simplifier, steps: Steps, controlled: ControlledSystem) -> DecisionDiagram | None:
         """The condition to add to an event, simplified where it does not matter; None if there is nothing to add."""
-        if not steps.event.is_controllable:
+        if not controlled.is_disabled(steps):
             return None
-        care = self._reachable & steps.plant & steps.condition
-        return simplifier.condition(steps.only(self._good.states), care)
+        care = controlled.reachable & steps.plant & steps.condition
+        return simplifier.condition(controlled.conjuncts.only(steps), care)

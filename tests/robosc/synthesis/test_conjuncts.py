@@ -198,6 +198,13 @@ def test_what_is_near_decides_about_a_large_system(monkeypatch: pytest.MonkeyPat
     assert solutions == 0
 
 
+def test_conditions_of_a_large_system_test_what_is_near() -> None:
+    """Restricted to what matters, the condition on one event of the whole tests all places above it."""
+    added = synthesize(row(150)).added
+    assert len(added) == 150
+    assert all(len(item.condition.nodes) <= 2 for item in added)
+
+
 @settings(max_examples=examples(50))
 @given(seed=st.integers(0, 10_000), nodes=st.sampled_from([0, 100]))
 def test_values_of_variables(engine: str, seed: int, nodes: int) -> None:

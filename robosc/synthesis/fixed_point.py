@@ -121,8 +121,6 @@ class FixedPoint:
             problem: The problem.
             known: States that are known beforehand to be good.
         """
-        if self._encoding.system.is_controlled:
-            return self._given(problem)
         return self._first_of(
             lambda solver: solver.good_states(problem, known), lambda solver: solver.reached_good_states(problem, known)
         )
@@ -138,8 +136,6 @@ class FixedPoint:
             problem: The problem.
             good: The good states of the other one.
         """
-        if self._encoding.system.is_controlled:
-            return self._given(problem)
         ways, nothing = self._ways_of_less, self._encoding.manager.false
         found, place = self._first_of(
             *(
@@ -193,6 +189,8 @@ class FixedPoint:
 
     def good_states(self, problem: Problem, known: Any) -> GoodStates:
         """The states from which a supervisor can solve a problem; `known` states are known beforehand to be good."""
+        if self._encoding.system.is_controlled:
+            return self._given(problem)
         good, rounds = problem.safe, 0
         if self.initial == self._encoding.manager.false:
             where = " in which the plant invariants are true" if self._encoding.system.plant_invariants else ""

@@ -7,17 +7,18 @@ races end; after that `n` ways take `n` times the work of the quickest one, and 
 done the hardest part of its work may take the lead: then it goes on alone for a while, and what it does meanwhile comes
 on top if another one would have been quicker.
 
-The first way runs in the thread of the caller. Each other one has a thread of its own, since it is interrupted in the
-midst of recursive functions, but only one thread runs at a time: a turn is handed over. Whatever belongs to the caller,
-its questions whether to stop and its reports of progress, happens in its own thread.
+A way is interrupted in the midst of recursive functions, of Python and of C. So each but the first has a stack of its
+own: it is a greenlet, which needs no thread and no system call, so that confined processes may have it. The caller's
+questions whether to stop, and reports of progress, are on the caller's stack.
 
 Source: B. A. Huberman, R. M. Lukose and T. Hogg, "An economics approach to hard computational problems", Science 275,
 1997, pp. 51-54 (portfolios of algorithms that run interleaved).
 """
 
-import threading
 from collections.abc import Callable, Sequence
 from typing import Any
+
+from greenlet import getcurrent, greenlet
 
 from robosc.errors import NodeLimitError
 from robosc.synthesis.monitor import ProgressMonitor
@@ -31,9 +32,6 @@ SHARE = 1_000_000
 
 LEAD = 10
 """Times its work so far that a way which takes the lead may go on alone."""
-
-_STACK_BYTES = 64 * 2**20
-"""Stack of a thread: diagrams are walked recursively, a level at a time. Only what is used takes memory."""
 
 
 class _OvertakenError(Exception):
@@ -73,8 +71,7 @@ class Runner[T]:
         self.peak_nodes = 0
         self.target = 0
         self.lead_until = 0
-        self.thread: threading.Thread | None = None
-        self.turn = _held_lock()
+        self.stack: greenlet | None = None
         self.error: BaseException | None = None
         self.is_dismissed = False
         self.is_at_end = False
@@ -102,9 +99,9 @@ class Race(ProgressMonitor):
         self._monitor = monitor
         self._rivals: list[Runner[Any]] = []
         self._running: Runner[Any] | None = None
-        self._back = _held_lock()
+        self._caller = getcurrent()
 
-    # The caller's thread
+    # The caller's stack
 
     def first_of[T](self, runners: Sequence[Runner[T]]) -> T:
         """Return the result of the way that comes to its end first.
@@ -140,7 +137,7 @@ class Race(ProgressMonitor):
             runner.is_given_up = runner.is_dismissed = runner.is_at_end = False
             runner.target, runner.lead_until = runner.nodes, 0
         first.target += HEAD_START
-        self._rivals, self._running = list(rivals), first
+        self._rivals, self._running, self._caller = list(rivals), first, getcurrent()
         try:
             first.result = first.work()
         except _OvertakenError as error:
@@ -169,18 +166,16 @@ class Race(ProgressMonitor):
     def _let_run(self, rival: Runner[Any], first: Runner[Any]) -> None:
         before = rival.nodes
         self._running = rival
-        if rival.thread is None:
-            rival.thread = _started(lambda: self._run(rival))
-        rival.turn.release()
-        self._back.acquire()
+        if rival.stack is None:
+            rival.stack = greenlet(self._run)
+        rival.stack.switch(rival)
         self._running = first
         for item in rival.progress:
             self._monitor.tell(item)
         rival.progress.clear()
         if rival.is_at_end:
             self._rivals.remove(rival)
-            _join(rival.thread)
-            rival.thread = None
+            rival.stack = None
         error, rival.error = rival.error, None
         try:
             if error is not None:
@@ -200,7 +195,7 @@ class Race(ProgressMonitor):
             self._monitor.check_stop(steps)
             return
         except NodeLimitError:
-            if all(rival.thread is None for rival in self._rivals):
+            if all(rival.stack is None for rival in self._rivals):
                 raise
         for rival in self._rivals:
             rival.is_given_up = True
@@ -208,50 +203,40 @@ class Race(ProgressMonitor):
         self._monitor.check_stop(0)
 
     def _dismiss(self) -> None:
-        """End the threads of all others, one by one: only one thread at a time may drop predicates of a manager."""
+        """End the work of all others."""
         rivals, self._rivals = self._rivals, []
-        for rival in sorted(rivals, key=lambda rival: rival is not self._running):
+        for rival in rivals:
             rival.is_dismissed = True
-            if rival.thread is not None:
-                rival.turn.release()
-                _join(rival.thread)
-                rival.thread, rival.turn = None, _held_lock()
-        # A dismissed way has handed back a turn that nobody waits for.
-        self._back = _held_lock()
+            if rival.stack is not None:
+                self._running = rival
+                while not rival.stack.dead:
+                    rival.stack.switch(rival)
+                rival.stack = None
+        for rival in rivals:
+            if rival.error is not None:
+                # It came while the work ended.
+                raise rival.error
 
-    # The thread of a rival
+    # The stack of a rival
 
     def _run(self, rival: Runner[Any]) -> None:
         try:
-            self._wait(rival)
             rival.result = rival.work()
             rival.has_won = True
         except _DismissedError:
             pass
         except NodeLimitError:
             rival.is_given_up = True
-        except BaseException as error:  # the caller's thread raises it
+        except BaseException as error:  # the caller raises it
             rival.error = error
         rival.is_at_end = True
-        self._hand_back()
 
-    def _hand_back(self) -> None:
-        # It is held while the caller's thread waits, unless the user has interrupted that.
-        if self._back.locked():
-            self._back.release()
-
-    def _wait(self, rival: Runner[Any]) -> None:
-        """Wait for the next turn."""
-        rival.turn.acquire()
-        if rival.is_dismissed:
-            raise _DismissedError
-
-    # Any thread
+    # Any stack
 
     def check_stop(self, steps: int = 1) -> None:
         """Before each step: see `ProgressMonitor`."""
         runner = self._running
-        if runner is None or runner.thread is None:
+        if runner is None or runner.stack is None:
             self._check(steps)
         elif runner.is_dismissed:
             raise _DismissedError
@@ -265,12 +250,13 @@ class Race(ProgressMonitor):
             self._monitor.spend(nodes)
             return
         runner.nodes += nodes
-        if runner.thread is None:
+        if runner.stack is None:
             self._monitor.spend(nodes)
             self._take_turns(runner)
         elif runner.nodes >= runner.target:
-            self._hand_back()
-            self._wait(runner)
+            self._caller.switch()
+            if runner.is_dismissed:
+                raise _DismissedError
 
     def lead(self) -> None:
         """Let the way that works now go on alone for a while: the hardest part of it is done."""
@@ -282,35 +268,8 @@ class Race(ProgressMonitor):
         runner = self._running
         if runner is not None:
             runner.peak_nodes = max(runner.peak_nodes, progress.nodes)
-        if runner is None or runner.thread is None:
+        if runner is None or runner.stack is None:
             self.peak_nodes = max(self.peak_nodes, progress.nodes)
             self._monitor.tell(progress)
         else:
             runner.progress.append(progress)
-
-
-def _held_lock() -> threading.Lock:
-    """Return a lock for which one thread waits until another one releases it; an interrupt leaves it as it is."""
-    lock = threading.Lock()
-    lock.acquire()
-    return lock
-
-
-def _started(work: Callable[[], None]) -> threading.Thread:
-    """Return a thread, which has begun, with a stack that is large enough."""
-    before = threading.stack_size(_STACK_BYTES)
-    try:
-        thread = threading.Thread(target=work, name="robosc race", daemon=True)
-        thread.start()
-    finally:
-        threading.stack_size(before)
-    return thread
-
-
-def _join(thread: threading.Thread) -> None:
-    """Wait for the end of a thread, which is near, even if the user is impatient meanwhile."""
-    while thread.is_alive():
-        try:
-            thread.join()
-        except KeyboardInterrupt:
-            continue

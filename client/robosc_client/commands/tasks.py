@@ -178,9 +178,7 @@ def _check(arguments: argparse.Namespace, client: Client) -> int:
     def make(bundle: Bundle) -> "SynthesisOutcome":
         options = replace(synthesis_options(arguments), allow_livelock=False)
         with ProgressLine() as line:
-            found = client.synthesize(
-                bundle, options, is_modular=arguments.modular, deadline_s=arguments.deadline, on_progress=line.report
-            )
+            found = client.synthesize(bundle, options, deadline_s=arguments.deadline, on_progress=line.report)
         return outcome_from_response(found)
 
     return check_here.run_with(arguments, lambda bundle: client.check(bundle, deadline_s=arguments.deadline), make)

@@ -122,8 +122,8 @@ def test_explanations_agree_with_explicit_synthesis() -> None:
 
 
 _SEARCHES: tuple[Callable[..., Any], ...] = (
-    lambda solver, backwards, onwards: backwards(solver),
-    lambda solver, backwards, onwards: onwards(solver),
+    lambda solver, backwards, *others: backwards(solver),
+    lambda solver, backwards, onwards, *others: onwards(solver),
 )
 
 

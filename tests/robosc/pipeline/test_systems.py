@@ -186,5 +186,5 @@ def test_ways_to_begin_are_part_of_the_answer() -> None:
 def test_other_doors_are_closed() -> None:
     supervisor = robosc.synthesize(replace(MACHINE, invariants=(Constant(True), StateTest("M", "idle")))).supervisor
     assert supervisor is not None
-    with pytest.raises(TypeError, match="properties and supervisor= need a model"):
+    with pytest.raises(TypeError, match="properties, supervisor= and as_is= need a model"):
         robosc.verify(supervisor, "invariant true")  # type: ignore[call-overload]

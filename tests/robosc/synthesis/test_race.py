@@ -1,10 +1,12 @@
-"""Races: fair turns, one thread at a time, the caller's business in the caller's thread, and no thread that is left."""
+"""Races: fair turns, the caller's business on the caller's stack, and no stack that is left."""
 
+import gc
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
 
 import pytest
+from greenlet import getcurrent, greenlet
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -19,12 +21,12 @@ LEAD = -1
 
 @pytest.fixture(autouse=True)
 def short_turns(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Turns of ten nodes, and that no thread is left after a test."""
+    """Turns of ten nodes, and no way that is left in the midst of its work after a test."""
     monkeypatch.setattr(race, "HEAD_START", 30)
     monkeypatch.setattr(race, "SHARE", 10)
-    before = threading.enumerate()
     yield
-    assert threading.enumerate() == before
+    left = [item for item in gc.get_objects() if isinstance(item, greenlet) and not item.dead]
+    assert left in ([], [getcurrent()])
 
 
 def silent() -> ProgressMonitor:
@@ -105,7 +107,7 @@ def test_a_way_that_takes_the_lead_goes_on_alone() -> None:
     assert met == [*[0] * 3, 1, 0, *[1] * 11, *[0, 1] * 3]
 
 
-def test_a_race_that_ends_within_the_head_start_has_no_thread() -> None:
+def test_a_race_that_ends_within_the_head_start_has_no_other_way() -> None:
     monitor, met = Race(silent()), list[int]()
     runners = runners_of(monitor, [[10, 10], [1]], met)
     assert monitor.first_of(runners) == 0
@@ -113,17 +115,17 @@ def test_a_race_that_ends_within_the_head_start_has_no_thread() -> None:
     assert not runners[1].has_begun
 
 
-def test_all_that_is_the_callers_happens_in_its_thread_and_one_thread_runs_at_a_time() -> None:
-    here = threading.current_thread()
+def test_all_that_is_the_callers_happens_on_its_stack() -> None:
+    here = getcurrent()
     told: list[SynthesisProgress] = []
-    threads = set[threading.Thread]()
+    stacks = set[greenlet]()
 
     def tell(progress: SynthesisProgress) -> None:
-        assert threading.current_thread() is here
+        assert getcurrent() is here
         told.append(progress)
 
     def should_stop() -> bool:
-        assert threading.current_thread() is here
+        assert getcurrent() is here
         return False
 
     monitor = Race(ProgressMonitor(should_stop, tell))
@@ -133,7 +135,7 @@ def test_all_that_is_the_callers_happens_in_its_thread_and_one_thread_runs_at_a_
         for step in range(steps):
             running[0] += 1
             assert running[0] == 1
-            threads.add(threading.current_thread())
+            stacks.add(getcurrent())
             monitor.check_stop()
             monitor.tell(SynthesisProgress("test", step, steps))
             running[0] -= 1
@@ -141,7 +143,8 @@ def test_all_that_is_the_callers_happens_in_its_thread_and_one_thread_runs_at_a_
         return steps
 
     assert monitor.first_of([Runner(lambda: work(100)), Runner(lambda: work(20)), Runner(lambda: work(200))]) == 20
-    assert len(threads) == 3
+    assert len(stacks) == 3
+    stacks.clear()
     assert [item.iteration for item in told if item.nodes == 20] == list(range(20))
     assert monitor.peak_nodes == 20
 
@@ -192,14 +195,13 @@ def test_the_caller_ends_a_race(error: BaseException | None, asked: int) -> None
 
 
 def test_an_interrupt_while_another_way_runs() -> None:
-    caller = threading.current_thread()
-    if caller is not threading.main_thread():
+    if threading.current_thread() is not threading.main_thread():
         pytest.skip("interrupts reach the main thread alone")
     monitor = Race(silent())
 
     def work() -> int:
         monitor.spend(25)
-        signal.pthread_kill(caller.ident or 0, signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
         while True:
             monitor.check_stop()
 

@@ -118,6 +118,7 @@ def test_others_are_given_up_where_diagrams_become_too_large(monkeypatch: pytest
     """A result that one strategy finds with so many nodes alone comes out although others began beside it."""
     monkeypatch.setattr(race, "HEAD_START", 1)
     monkeypatch.setattr(race, "SHARE", 5_000)
+    monkeypatch.setattr(race, "LEAD", 0)
     system = cat_and_mouse(3, 2)
     least = next(limit for limit in range(1_000, 100_000, 500) if _fits(system, limit, monkeypatch))
     found = synthesize(system, engine=EngineOptions("cudd", maximum_nodes=least))

@@ -204,6 +204,7 @@ class Race(ProgressMonitor):
 
     def _dismiss(self) -> None:
         """End the work of all others."""
+        running = self._running
         rivals, self._rivals = self._rivals, []
         for rival in rivals:
             rival.is_dismissed = True
@@ -212,6 +213,7 @@ class Race(ProgressMonitor):
                 while not rival.stack.dead:
                     rival.stack.switch(rival)
                 rival.stack = None
+        self._running = running
         for rival in rivals:
             if rival.error is not None:
                 # It came while the work ended.

@@ -251,6 +251,8 @@ def test_others_are_given_up_where_there_are_too_many_nodes() -> None:
     assert nodes.monitor.first_of(runners) == "a"
     assert nodes.begun == ["a", "b", "c"]
     assert [runner.is_given_up for runner in runners] == [False, True, True]
+    # The work that is left counts as that of the first one.
+    assert runners[0].nodes == 90
 
 
 def test_others_begin_anew_where_the_first_takes_too_many_nodes_alone() -> None:

@@ -13,8 +13,8 @@
 #include <dlfcn.h>
 #include <limits.h>
 
-/* Steps between two calls of `pause`, which asks whether to go on; the twin of PAUSE in saturation.py. */
-enum { PAUSE = 16 };
+/* The twins of constants in saturation.py. */
+enum { PAUSE = 16, NODES_OF_A_LOOK = 4 };
 
 typedef struct DdManager DdManager;
 typedef struct DdNode DdNode;
@@ -33,6 +33,7 @@ static struct {
     DdNode *(*ite)(DdManager *, DdNode *, DdNode *, DdNode *);
     DdNode *(*and_exist)(DdManager *, DdNode *, DdNode *, DdNode *);
     DdNode *(*compose)(DdManager *, DdNode *, DdNode **);
+    DdNode *(*compose_one)(DdManager *, DdNode *, DdNode *, int);
     DdNode *(*cofactor)(DdManager *, DdNode *, DdNode *);
     int (*leq)(DdManager *, DdNode *, DdNode *);
     unsigned int (*index)(DdNode *);
@@ -44,6 +45,7 @@ static struct {
     DdNode *(*variable)(DdManager *, int);
     int (*size)(DdManager *);
     int (*dag_size)(DdNode *);
+    int (*sharing_size)(DdNode **, int);
 } cudd;
 
 static const struct {
@@ -51,11 +53,12 @@ static const struct {
     void *place;
 } NEEDED[] = {
     {"Cudd_Ref", &cudd.ref},
-    {"Cudd_RecursiveDeref", &cudd.deref},
+    {"Cudd_DelayedDerefBdd", &cudd.deref},
     {"Cudd_bddAnd", &cudd.and},
     {"Cudd_bddIte", &cudd.ite},
     {"Cudd_bddAndAbstract", &cudd.and_exist},
     {"Cudd_bddVectorCompose", &cudd.compose},
+    {"Cudd_bddCompose", &cudd.compose_one},
     {"Cudd_Cofactor", &cudd.cofactor},
     {"Cudd_bddLeq", &cudd.leq},
     {"Cudd_NodeReadIndex", &cudd.index},
@@ -67,6 +70,7 @@ static const struct {
     {"Cudd_bddIthVar", &cudd.variable},
     {"Cudd_ReadSize", &cudd.size},
     {"Cudd_DagSize", &cudd.dag_size},
+    {"Cudd_SharingSize", &cudd.sharing_size},
 };
 
 /* Nodes */
@@ -82,6 +86,7 @@ static DdNode *owned(DdNode *f) {
     return f;
 }
 
+/* Give up a reference. What it alone has held is dead a little later: most of it is found again before. */
 static void drop(DdManager *manager, DdNode *f) {
     if (f != NULL) {
         cudd.deref(manager, f);
@@ -229,10 +234,17 @@ typedef struct {
     Py_ssize_t group_count, step_count;
     Table known;
     PyObject *pause, *report;
-    long long taken, reported, asked;
+    /* Steps taken in all, at the last call of `pause`, and when to look at a step again; nodes the last such step made. */
+    long long taken, reported, asked, next;
+    int made;
 } Closure;
 
 static DdNode *composed(Closure *closure, DdNode *f, const Substitutions *substitutions) {
+    if (substitutions->count == 1) {
+        /* CUDD finds in its cache what it has composed before, which it does not for several at once. */
+        const Substitution *only = substitutions->items;
+        return owned(cudd.compose_one(closure->manager, f, only->function, only->index));
+    }
     for (Py_ssize_t place = 0; place < substitutions->count; place++) {
         Substitution *item = &substitutions->items[place];
         closure->identity[item->index] = item->function;
@@ -294,27 +306,17 @@ static int report_round(Closure *closure, DdNode *states) {
     return answered(PyObject_CallFunction(closure->report, "LK", closure->reported, address));
 }
 
-/* Call `pause` with the number of steps since its last call and of the nodes that the next one is about; false if it
-   raised an exception. */
-static int may_go_on(Closure *closure, int nodes) {
+/* Call `pause` with the number of steps since its last call and of the nodes that one of them made; false if it raised
+   an exception. */
+static int may_go_on(Closure *closure) {
     long long steps = closure->taken - closure->asked;
     closure->asked = closure->taken;
-    return answered(PyObject_CallFunction(closure->pause, "Li", steps, nodes));
+    return answered(PyObject_CallFunction(closure->pause, "Li", steps, closure->made));
 }
 
-/* States, and the states within a predicate that a step reaches from the new ones. */
-static DdNode *grown(Closure *closure, DdNode *states, DdNode *within, const Step *step, DdNode *new) {
+/* The states within a predicate that a step reaches from some states; these if they are all there is. */
+static DdNode *added_by(Closure *closure, DdNode *states, DdNode *within, const Step *step) {
     DdManager *manager = closure->manager;
-    if (closure->taken % PAUSE == 0 && !may_go_on(closure, cudd.dag_size(new))) {
-        return NULL;
-    }
-    closure->taken++;
-    if (closure->taken >= (closure->reported + 1) * closure->step_count && !report_round(closure, states)) {
-        return NULL;
-    }
-    if (new == closure->zero) {
-        return owned(states);
-    }
     if (step->room != NULL) {
         DdNode *room = conjunction(manager, within, step->room);
         if (room == NULL) {
@@ -326,28 +328,46 @@ static DdNode *grown(Closure *closure, DdNode *states, DdNode *within, const Ste
             return owned(states);
         }
     }
-    DdNode *added = image(closure, step, new);
-    if (added != NULL) {
-        added = instead(manager, added, conjunction(manager, added, within));
+    DdNode *added = image(closure, step, states);
+    return added == NULL ? NULL : instead(manager, added, conjunction(manager, added, within));
+}
+
+/* Count the nodes that a step has made, and put off the next look: the larger the diagrams, the longer. */
+static void look_at(Closure *closure, DdNode *states, DdNode *added, DdNode *found) {
+    DdNode *all[] = {states, added, found};
+    int size = cudd.dag_size(states);
+    closure->made = cudd.sharing_size(all, 3) - size;
+    closure->next = closure->taken + PAUSE + size / NODES_OF_A_LOOK;
+}
+
+/* States, and the states within a predicate that a step reaches from them. */
+static DdNode *grown(Closure *closure, DdNode *states, DdNode *within, const Step *step) {
+    DdManager *manager = closure->manager;
+    if (closure->taken % PAUSE == 0 && !may_go_on(closure)) {
+        return NULL;
     }
-    return added == NULL ? NULL : instead(manager, added, disjunction(manager, states, added));
+    if (closure->taken + 1 >= (closure->reported + 1) * closure->step_count && !report_round(closure, states)) {
+        return NULL;
+    }
+    DdNode *added = added_by(closure, states, within, step);
+    DdNode *found = added == NULL ? NULL : disjunction(manager, states, added);
+    if (found != NULL && closure->taken >= closure->next) {
+        look_at(closure, states, added, found);
+    }
+    closure->taken++;
+    drop(manager, added);
+    return found;
 }
 
 static DdNode *saturated(Closure *closure, DdNode *states, DdNode *within, int number);
 
 /* The closure of a set under the steps of one group and of the groups below it; the set is dropped. */
-static DdNode *closed_under(Closure *closure, DdNode *states, DdNode *within, int number, DdNode **seen) {
+static DdNode *closed_under(Closure *closure, DdNode *states, DdNode *within, int number) {
     DdManager *manager = closure->manager;
     const Group *group = &closure->groups[number];
     Py_ssize_t vain = 0, place = 0;
     while (vain < group->count) {
-        DdNode *new = conjunction(manager, states, negation(seen[place]));
-        if (new == NULL) {
-            return instead(manager, states, NULL);
-        }
-        DdNode *more = grown(closure, states, within, &group->steps[place], new);
-        drop(manager, new);
-        seen[place] = instead(manager, seen[place], owned(states));
+        DdNode *more = grown(closure, states, within, &group->steps[place]);
         place = (place + 1) % group->count;
         vain++;
         if (more == NULL) {
@@ -381,23 +401,7 @@ static DdNode *worked_out(Closure *closure, DdNode *states, DdNode *within, int 
         return joined(manager, level, low, high);
     }
     states = saturated(closure, states, within, number + 1);
-    if (states == NULL) {
-        return NULL;
-    }
-    DdNode **seen = PyMem_Malloc((size_t)group->count * sizeof(DdNode *));
-    if (seen == NULL) {
-        PyErr_NoMemory();
-        return instead(manager, states, NULL);
-    }
-    for (Py_ssize_t place = 0; place < group->count; place++) {
-        seen[place] = owned(closure->zero);
-    }
-    states = closed_under(closure, states, within, number, seen);
-    for (Py_ssize_t place = 0; place < group->count; place++) {
-        drop(manager, seen[place]);
-    }
-    PyMem_Free(seen);
-    return states;
+    return states == NULL ? NULL : closed_under(closure, states, within, number);
 }
 
 static DdNode *saturated(Closure *closure, DdNode *states, DdNode *within, int number) {
@@ -430,7 +434,7 @@ static DdNode *of_whole(Closure *closure, DdNode *states, DdNode *within) {
         for (Py_ssize_t place = 0; states != NULL && place < topmost->count && !is_enough; place++) {
             is_enough = is_done(closure, states);
             if (!is_enough) {
-                states = instead(manager, states, grown(closure, states, within, &topmost->steps[place], states));
+                states = instead(manager, states, grown(closure, states, within, &topmost->steps[place]));
             }
         }
         is_enough = is_enough || states == before;
@@ -580,7 +584,7 @@ PyObject *diagram_closure(PyObject *module, PyObject *arguments) {
     if (read_groups(&closure, groups) && read_identity(&closure) && make_table(&closure.known, 1024)) {
         found = of_whole(&closure, owned((DdNode *)(uintptr_t)states), (DdNode *)(uintptr_t)within);
     }
-    if (found != NULL && !may_go_on(&closure, 0)) {
+    if (found != NULL && !may_go_on(&closure)) {
         found = instead(closure.manager, found, NULL);
     }
     free_closure(&closure);

@@ -83,7 +83,7 @@ class Chaining:
         self._monitor.check_stop()
         # The sizes of diagrams depend on the engine while it changes its order.
         self._monitor.spend(_STEP_NODES)
-        return step.grown(states, self._within, states)
+        return states | step.added(states, self._within)
 
 
 class _Work:

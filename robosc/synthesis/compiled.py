@@ -127,8 +127,8 @@ class Kernel:
             within: Predicate that added states satisfy.
             groups: Steps as `saturation` has them for the kernel.
             until: States once all of which are found the rest is not; or None.
-            pause: Called again and again with the number of steps since the last call, and that of the nodes which the
-                next step is about; what it raises ends the work.
+            pause: Called again and again with the number of steps since the last call, and that of the nodes which one
+                of them made; what it raises ends the work.
             report: Called with the number of the round and the address of the states that are found then.
         """
         begin, inside, enough = self.address(states), self.address(within), self.address(until)

@@ -183,7 +183,6 @@ class FixedPoint:
     def reached_good_states(self, problem: Problem, known: Any) -> GoodStates:
         """The good states among those that the problem lets runs reach; `known` states are known to be good."""
         reached = self.states_from(problem, self.initial & problem.safe, problem.safe)
-        self._monitor.lead()
         found = self.good_states(Problem(problem.steps, reached), known & reached)
         return replace(found, is_of_reached=True)
 

@@ -44,9 +44,6 @@ class ProgressMonitor:
             raise SynthesisCancelled("synthesis was stopped")
         self._check_nodes()
 
-    def lead(self) -> None:
-        """After the hardest part of some work, of which the rest takes little."""
-
     def spend(self, nodes: int) -> None:
         """After some work.
 

@@ -5,7 +5,7 @@ ICCAD 1990, pp. 126-129 (restrict); R. E. Bryant, "Graph-based algorithms for Bo
 IEEE Trans. Computers C-35(8), 1986, pp. 677-691 (counting).
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -141,6 +141,27 @@ class _Counter:
             # The node is kept with its count: its number could otherwise be given to another one.
             found = self._known[int(node)] = (node, total)
         return found[1]
+
+
+def nodes_made(known: Any, *found: Any) -> int:
+    """Return the number of nodes of some predicates that another one does not have."""
+    seen = set[int]()
+    _go_through([known], seen)
+    before = len(seen)
+    _go_through(found, seen)
+    return len(seen) - before
+
+
+def _go_through(predicates: Iterable[Any], seen: set[int]) -> None:
+    """Add the numbers of all nodes of some predicates: a node and its complement are one."""
+    stack = list(predicates)
+    while stack:
+        node = stack.pop()
+        regular = ~node if node.negated else node
+        if int(regular) not in seen:
+            seen.add(int(regular))
+            if regular.var is not None:
+                stack += regular.low, regular.high
 
 
 def without(manager: Manager, states: Any, cubes: Sequence[Any]) -> Any:

@@ -3,9 +3,7 @@
 Nobody knows beforehand which of them is quick, and the slow one may take a thousand times as long. So they take turns,
 with equal shares of work, measured in nodes of decision diagrams: these are the same on every machine and for every
 engine, and so is the winner. None begins anew when its turn comes. The first one has a head start, within which most
-races end; after that `n` ways take `n` times the work of the quickest one, and the head start, at most. A way that has
-done the hardest part of its work may take the lead: then it goes on alone for a while, and what it does meanwhile comes
-on top if another one would have been quicker.
+races end; after that `n` ways take `n` times the work of the quickest one, and the head start, at most.
 
 A way is interrupted in the midst of recursive functions, of Python and of C. So each but the first has a stack of its
 own: it is a greenlet, which needs no thread and no system call, so that confined processes may have it. The caller's
@@ -24,14 +22,11 @@ from robosc.errors import NodeLimitError
 from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.result import SynthesisProgress
 
-HEAD_START = 10_000_000
+HEAD_START = 1_000_000
 """Nodes that the first way may work on alone: some tenths of a second at most with the fastest engine."""
 
-SHARE = 1_000_000
+SHARE = 100_000
 """Nodes of one turn: some milliseconds with the fastest engine, and some tenths of a second with the slowest one."""
-
-LEAD = 10
-"""Times its work so far that a way which takes the lead may go on alone."""
 
 
 class _OvertakenError(Exception):
@@ -70,7 +65,6 @@ class Runner[T]:
         self.result: T | None = None
         self.peak_nodes = 0
         self.target = 0
-        self.lead_until = 0
         self.stack: greenlet | None = None
         self.error: BaseException | None = None
         self.is_dismissed = False
@@ -135,7 +129,7 @@ class Race(ProgressMonitor):
         """Return the winner, which has its result."""
         for runner in (first, *rivals):
             runner.is_given_up = runner.is_dismissed = runner.is_at_end = False
-            runner.target, runner.lead_until = runner.nodes, 0
+            runner.target = runner.nodes
         first.target += HEAD_START
         self._rivals, self._running, self._caller = list(rivals), first, getcurrent()
         try:
@@ -152,15 +146,12 @@ class Race(ProgressMonitor):
 
     def _take_turns(self, first: Runner[Any]) -> None:
         """Let the others do as much as the first way has done beyond its head start."""
-        while first.nodes >= max(first.target, first.lead_until) and self._rivals:
+        while first.nodes >= first.target and self._rivals:
             first.target += SHARE
             for rival in tuple(self._rivals):
                 rival.target += SHARE
                 # All are dismissed where there have come to be too many nodes.
                 if rival.nodes < rival.target and not rival.is_dismissed:
-                    self._let_run(rival, first)
-                while rival.nodes < rival.lead_until and not (rival.is_at_end or rival.is_dismissed):
-                    rival.target = rival.nodes + SHARE
                     self._let_run(rival, first)
 
     def _let_run(self, rival: Runner[Any], first: Runner[Any]) -> None:
@@ -259,11 +250,6 @@ class Race(ProgressMonitor):
             self._caller.switch()
             if runner.is_dismissed:
                 raise _DismissedError
-
-    def lead(self) -> None:
-        """Let the way that works now go on alone for a while: the hardest part of it is done."""
-        if self._running is not None:
-            self._running.lead_until = (1 + LEAD) * self._running.nodes
 
     def tell(self, progress: SynthesisProgress) -> None:
         """Pass on progress."""

@@ -22,14 +22,17 @@ from robosc.synthesis.compiled import Kernel, kernel_of
 from robosc.synthesis.engines import Manager
 from robosc.synthesis.image import Image
 from robosc.synthesis.monitor import ProgressMonitor
-from robosc.synthesis.nodes import cofactors
+from robosc.synthesis.nodes import cofactors, nodes_made
 from robosc.synthesis.step import Step, is_enough
 
-PAUSE = 16
-"""Steps of which one is looked at to estimate what they cost: to count the nodes of each would take as long as it."""
+_PAUSE = 16
+"""Steps after which work is counted, and after which one step at most is looked at to estimate what the others cost."""
 
-_STEP_NODES = 200
-"""Nodes that a step counts for beside those that it is about, most of which it finds in caches."""
+_NODES_OF_A_LOOK = 4
+"""Nodes of the states for which a look is put off by a step: to go through them takes as long as some steps."""
+
+_STEP_NODES = 10
+"""Nodes that a step counts for beside those that it makes: what it finds in caches takes about as long."""
 
 _FRAMES_PER_LEVEL = 2
 """Python frames for each level of a diagram, and for each group of steps, that saturation goes down."""
@@ -46,7 +49,7 @@ def saturation(
 
 
 def work_of(steps: int, nodes: int) -> int:
-    """Return the estimated work of some steps, as a number of nodes, from the nodes that one of them is about."""
+    """Return the estimated work of some steps, as a number of nodes, from the nodes that one of them made."""
     return steps * (_STEP_NODES + nodes)
 
 
@@ -88,7 +91,7 @@ class Saturation:
         allow_depth(len(levels) + len(self._groups), _FRAMES_PER_LEVEL)
         self._known: dict[tuple[int, int, int], tuple[Any, Any, Any]] = {}
         self._phase = ""
-        self._taken = self._reports = self._spent = 0
+        self._taken = self._reports = self._spent = self._next = self._made = 0
 
     def of(self, states: Any, phase: str, until: Any = None) -> Any:
         """Return `states` and all that steps from them add.
@@ -101,10 +104,10 @@ class Saturation:
         """
         if not self._groups:
             return states
-        self._taken = self._reports = self._spent = 0
+        self._taken = self._reports = self._spent = self._next = self._made = 0
         self._phase = phase
         states = self._of_whole(states, until)
-        self._spend(0)
+        self._spend()
         self._report(states)
         self._known.clear()
         return states
@@ -116,7 +119,7 @@ class Saturation:
             for step in topmost:
                 if is_enough(states, until):
                     return states
-                states = self._grown(states, self._within, step, states)
+                states = self._grown(states, self._within, step)
             if states == before:
                 break
         return states
@@ -141,13 +144,10 @@ class Saturation:
             high = self._saturated(high, high_inside, group)
             return self._manager.ite(self._variables[level], high, low)
         states = self._saturated(states, within, group + 1)
-        # The targets of states that a step has seen are there already: it is asked about new ones only.
-        seen = [self._false] * len(steps)
         # Once nothing has come of any step since the last time that something has, nothing ever will.
         vain, number = 0, 0
         while vain < len(steps):
-            grown = self._grown(states, within, steps[number], states & ~seen[number])
-            seen[number] = states
+            grown = self._grown(states, within, steps[number])
             number = (number + 1) % len(steps)
             vain += 1
             if grown != states:
@@ -155,18 +155,23 @@ class Saturation:
                 vain = 0
         return states
 
-    def _grown(self, states: Any, within: Any, step: Step, new: Any) -> Any:
+    def _grown(self, states: Any, within: Any, step: Step) -> Any:
         self._monitor.check_stop()
-        if self._taken % PAUSE == 0:
-            self._spend(new.dag_size)
-        self._taken += 1
-        if self._taken >= (self._reports + 1) * self._count:
+        if self._taken % _PAUSE == 0:
+            self._spend()
+        if self._taken + 1 >= (self._reports + 1) * self._count:
             self._report(states)
-        return states if new == self._false else step.grown(states, within, new)
+        added = step.added(states, within)
+        grown = states | added
+        if self._taken >= self._next:
+            self._made = nodes_made(states, added, grown)
+            self._next = self._taken + _PAUSE + states.dag_size // _NODES_OF_A_LOOK
+        self._taken += 1
+        return grown
 
-    def _spend(self, nodes: int) -> None:
+    def _spend(self) -> None:
         steps, self._spent = self._taken - self._spent, self._taken
-        self._monitor.spend(work_of(steps, nodes))
+        self._monitor.spend(work_of(steps, self._made))
 
     def _report(self, states: Any) -> None:
         self._reports += 1

@@ -22,12 +22,12 @@ class Step:
     room: Any = None
     compiled: tuple[tuple[object, ...], tuple[Any, ...]] | None = field(default=None, init=False, repr=False)
 
-    def grown(self, states: Any, within: Any, new: Any) -> Any:
-        """Return some states and what the event adds to them of those within a predicate, led from new ones."""
+    def added(self, states: Any, within: Any) -> Any:
+        """Return what the event leads to from some states, within a predicate; the states if they are all there is."""
         # The image is expensive, and mostly all that it could hold is there already.
         if self.room is not None and states | (within & self.room) == states:
             return states
-        return states | (within & self.add(new))
+        return within & self.add(states)
 
 
 def is_enough(states: Any, until: Any) -> bool:

@@ -15,9 +15,6 @@ from robosc.synthesis import SynthesisProgress, race
 from robosc.synthesis.monitor import BoundedMonitor, EffortSpentError, ProgressMonitor
 from robosc.synthesis.race import Race, Runner
 
-LEAD = -1
-"""Cost that stands for taking the lead."""
-
 
 @pytest.fixture(autouse=True)
 def short_turns(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
@@ -34,17 +31,14 @@ def silent() -> ProgressMonitor:
 
 
 def runners_of(monitor: Race, costs: Sequence[Sequence[int]], met: list[int] | None = None) -> list[Runner[int]]:
-    """Ways that spend some nodes each time, take the lead where that is `LEAD`, and are called by their number."""
+    """Ways that spend some nodes each time, and are called by their number."""
 
     def work(number: int) -> int:
         for cost in costs[number]:
             monitor.check_stop()
             if met is not None:
                 met.append(number)
-            if cost == LEAD:
-                monitor.lead()
-            else:
-                monitor.spend(cost)
+            monitor.spend(cost)
         return number
 
     return [Runner(lambda number=number: work(number)) for number in range(len(costs))]  # type: ignore[misc]
@@ -54,20 +48,16 @@ def simulated(costs: Sequence[Sequence[int]], head_start: int, share: int) -> tu
     """The winner, and the nodes of each way, without a thread."""
     waiting = [iter(chunks) for chunks in costs]
     nodes, targets = [0] * len(costs), [head_start] + [0] * (len(costs) - 1)
-    leads = [0] * len(costs)
 
     def ends(number: int) -> bool:
         for cost in waiting[number]:
-            if cost == LEAD:
-                leads[number] = 11 * nodes[number]
-                continue
             nodes[number] += cost
-            if nodes[number] >= max(targets[number], leads[number]):
+            if nodes[number] >= targets[number]:
                 return False
         return True
 
     while not ends(0):
-        while nodes[0] >= max(targets[0], leads[0]) and len(costs) > 1:
+        while nodes[0] >= targets[0] and len(costs) > 1:
             targets[0] += share
             for number in range(1, len(costs)):
                 targets[number] += share
@@ -77,7 +67,7 @@ def simulated(costs: Sequence[Sequence[int]], head_start: int, share: int) -> tu
 
 
 @given(
-    st.lists(st.lists(st.integers(LEAD, 25), max_size=30), min_size=1, max_size=4),
+    st.lists(st.lists(st.integers(0, 25), max_size=30), min_size=1, max_size=4),
     st.integers(1, 60),
     st.integers(1, 30),
 )
@@ -91,20 +81,9 @@ def test_turns_are_those_of_the_twin(costs: list[list[int]], head_start: int, sh
     nodes = [runner.nodes for runner in runners]
     assert (winner, nodes) == simulated(costs, head_start, share)
     assert [runner.has_won for runner in runners] == [number == winner for number in range(len(costs))]
-    if not any(LEAD in chunks for chunks in costs):
-        # No way is worked on for longer than the best one, but for its head start and what it does at once.
-        at_once = share + 25
-        assert sum(nodes) <= len(costs) * (min(map(sum, costs)) + at_once) + head_start
-
-
-def test_a_way_that_takes_the_lead_goes_on_alone() -> None:
-    monitor, met = Race(silent()), list[int]()
-    assert monitor.first_of(runners_of(monitor, [[10] * 30, [10, LEAD, *[10] * 9]], met)) == 1
-    assert met == [*[0] * 3, 1, 0, *[1] * 10]
-    # The lead ends at eleven times the work so far.
-    met.clear()
-    assert monitor.first_of(runners_of(monitor, [[10] * 7, [10, LEAD, *[10] * 19]], met)) == 0
-    assert met == [*[0] * 3, 1, 0, *[1] * 11, *[0, 1] * 3]
+    # No way is worked on for longer than the best one, but for its head start and what it does at once.
+    at_once = share + 25
+    assert sum(nodes) <= len(costs) * (min(map(sum, costs)) + at_once) + head_start
 
 
 def test_a_race_that_ends_within_the_head_start_has_no_other_way() -> None:

@@ -103,13 +103,15 @@ class Conjuncts:
     def avoidable(self, states: Any) -> Any:
         """Return the states from which no run of uncontrollable events leads to some states; None where it is large."""
         found, waiting = states, True
+        # What a condition of the model takes is there already.
+        limit = max(MAXIMUM_NODES, states.dag_size)
         while waiting:
             before = found
             for steps in self.touching(self._manager.support(found)):
                 if not steps.event.is_controllable:
                     self._monitor.check_stop()
                     found = found | steps.some(found)
-            if found.dag_size > MAXIMUM_NODES:
+            if found.dag_size > limit:
                 return None
             waiting = found != before
         return ~found

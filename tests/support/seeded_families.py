@@ -83,8 +83,14 @@ def product_line(size: int, seed: int) -> System:
         for number in range(count)
     ]
     rules = []
+    # Depth first: features that are near each other by number are near each other in the tree.
+    open_ = [0]
     for number in range(1, count):
-        child, parent = read(f"F{number}.has"), read(f"F{(number - 1) // 2}.has")
+        child, parent = read(f"F{number}.has"), read(f"F{open_[-1]}.has")
+        if dice.random() < 0.5 and len(open_) < 6:
+            open_.append(number)
+        elif len(open_) > 1 and dice.random() < 0.5:
+            open_.pop()
         rules.append(Binary("=", child, parent) if dice.random() < 0.3 else _either(_no(child), parent))
     devices: list[Automaton] = []
     needs: Needs = []

@@ -14,7 +14,6 @@ satisfy is followed downwards together with them); on binary diagrams T. van Dij
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from operator import itemgetter
 from typing import Any
 
 from robosc.recursion import allow_depth
@@ -54,17 +53,13 @@ def work_of(steps: int, nodes: int) -> int:
 
 
 def _grouped(levels: Mapping[str, int], steps: Sequence[Step]) -> list[tuple[int, list[Step]]]:
-    """Return the steps that begin at each level, topmost first; in a group those that reach down farthest come first.
-
-    Then less depends on the order in which events are declared: those that join distant parts find these closed.
-    """
-    groups: defaultdict[int, list[tuple[int, Step]]] = defaultdict(list)
+    """Return the steps that begin at each level, topmost first."""
+    groups: defaultdict[int, list[Step]] = defaultdict(list)
     for step in steps:
         # One that neither reads nor changes anything leads nowhere.
         if step.names:
-            touched = [levels[name] for name in step.names]
-            groups[min(touched)].append((-max(touched), step))
-    return [(top, [step for _, step in sorted(group, key=itemgetter(0))]) for top, group in sorted(groups.items())]
+            groups[min(levels[name] for name in step.names)].append(step)
+    return sorted(groups.items())
 
 
 class Saturation:

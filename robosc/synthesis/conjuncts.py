@@ -103,8 +103,8 @@ class Conjuncts:
     def avoidable(self, states: Any) -> Any:
         """Return the states from which no run of uncontrollable events leads to some states; None where it is large."""
         found, waiting = states, True
-        # What a condition of the model takes is there already.
-        limit = max(MAXIMUM_NODES, states.dag_size)
+        # Nodes of a condition of the model are there already.
+        limit = MAXIMUM_NODES
         while waiting:
             before = found
             for steps in self.touching(self._manager.support(found)):

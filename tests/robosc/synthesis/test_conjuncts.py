@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc.automata import Semantics, System
-from robosc.automata.compile import NO_DATA, compile_expression
-from robosc.automata.state import subjects
+from robosc.automata.compile import NO_DATA, compile_expression, subjects_read
+from robosc.automata.state import Subject, subjects
 from robosc.expressions import TRUE, Expression, StateTest, Unary, conjunction
-from robosc.synthesis import Answers, Questions, Restriction, synthesize
+from robosc.synthesis import Answers, Questions, Restriction, conjuncts, synthesize
 from robosc.synthesis.conjuncts import Conjuncts
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
@@ -25,6 +25,7 @@ from robosc.synthesis.transitions import Steps, transition_of
 from support.effort import examples, seeds
 from support.engines import needs_cudd
 from support.random_systems import any_systems, random_system
+from support.seeded_families import SEEDED_FAMILIES
 from support.systems import automaton, edge, system
 
 pytestmark = needs_cudd
@@ -203,6 +204,20 @@ def test_conditions_of_a_large_system_test_what_is_near() -> None:
     added = synthesize(row(150)).added
     assert len(added) == 150
     assert all(len(item.condition.nodes) <= 2 for item in added)
+
+
+def test_a_condition_of_the_model_is_near_its_places_however_large_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(conjuncts, "MAXIMUM_NODES", 1)
+    bins = SEEDED_FAMILIES["loads"](30, 1)
+    near = {
+        place: {other for item in bins.invariants if place in subjects_read(item) for other in subjects_read(item)}
+        for place in subjects(bins)
+    }
+    added = synthesize(bins).added
+    assert len(added) == 30
+    for item in added:
+        tested = {Subject(node.automaton, node.variable) for node in item.condition.nodes}
+        assert tested <= near[Subject(item.event.removesuffix("_up"), "at")]
 
 
 @settings(max_examples=examples(50))

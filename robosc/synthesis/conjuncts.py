@@ -104,7 +104,7 @@ class Conjuncts:
         """Return the states from which no run of uncontrollable events leads to some states; None where it is large."""
         found, waiting = states, True
         # Nodes of a condition of the model are there already.
-        limit = MAXIMUM_NODES
+        limit = max(MAXIMUM_NODES, states.dag_size)
         while waiting:
             before = found
             for steps in self.touching(self._manager.support(found)):

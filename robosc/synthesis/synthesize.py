@@ -171,11 +171,12 @@ class _Portfolio:
     def _attempt(self, *, is_other: bool) -> _Attempt:
         """The system in the best order or the other one, encoded once."""
         if is_other not in self._attempts:
-            place, self._first = self._first, None
+            place = order = None
+            if is_other:
+                order = other_order(self._system, blocks_of(self._system).places, self._best)
+            else:
+                place, self._first = self._first, None
             if place is None:
-                order = None
-                if is_other:
-                    order = other_order(self._system, blocks_of(self._system).places, self._best)
                 place = self._places.opened(self._system, self._race, order=order)
             self._names[is_other] = place.encoding.order_name
             try:

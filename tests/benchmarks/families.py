@@ -3,7 +3,8 @@
 Usage: run.py families [DIR]
 
 Every size of a family is declared in `ORDERS` orders. With a folder of CIF models these are shuffled instead.
-A synthesis that takes longer than the limit is counted with the limit, and marked.
+A synthesis that takes longer than the limit is counted with the limit, and marked. Each line goes to standard error as
+soon as it is measured.
 """
 
 import json
@@ -70,7 +71,10 @@ def _row(name: str, size: int, before: tuple[int, float] | None, label: str) -> 
     median, worst = statistics.median(times), max(times)
     growth = f"n^{math.log(median / before[1]) / math.log(size / before[0]):.1f}" if before else ""
     mark = "> " if worst >= LIMIT_S else ""
-    return [label, f"{median:.3f}", f"{mark}{worst:.3f}", f"{worst / median:.1f}", growth], median
+    row = [label, f"{median:.3f}", f"{mark}{worst:.3f}", f"{worst / median:.1f}", growth]
+    # The whole table takes an hour.
+    sys.stderr.write("  ".join(row) + "\n")
+    return row, median
 
 
 def table(arguments: Sequence[str] = ()) -> str:

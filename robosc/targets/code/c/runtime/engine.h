@@ -243,11 +243,24 @@ typedef struct {
 
 #endif
 #if ROBOT_SET_COUNT > 0
-/* Set of numbers: the bit of each, and of each word of these that is not zero. */
+#if ROBOT_IS_SMALL
+/* Set of numbers below 32: a bit for each. */
+typedef uint32_t robot_set_t;
+#else
+/* Set of numbers: the bit of each, and of each word of these that is not zero. Large sets have wide words, so that few
+   of these are gone through. */
+#if ROBOT_SET_COUNT > 1024
+typedef uint64_t robot_word_t;
+enum { ROBOT_WORD_BITS = 64 };
+#else
+typedef uint32_t robot_word_t;
+enum { ROBOT_WORD_BITS = 32 };
+#endif
 typedef struct {
-    uint32_t used[(ROBOT_SET_COUNT + 1023) / 1024];
-    uint32_t bits[(ROBOT_SET_COUNT + 31) / 32];
+    robot_word_t used[(ROBOT_SET_COUNT / ROBOT_WORD_BITS + ROBOT_WORD_BITS) / ROBOT_WORD_BITS];
+    robot_word_t bits[ROBOT_SET_COUNT / ROBOT_WORD_BITS + 1];
 } robot_set_t;
+#endif
 
 #endif
 typedef struct {

@@ -86,21 +86,15 @@ static int next_random(robot_t *r, int count)
 static int choose_random(robot_t *r, const robot_set_t *among)
 {
     int left = 0;
-    for (int word = 0; word < SET_WORDS; word++) {
-        for (uint32_t bits = among->bits[word]; bits != 0; bits &= bits - 1) {
-            left++;
-        }
+    for (int turn = first_in(among); turn >= 0; turn = next_in(among, turn)) {
+        left++;
     }
     if (left > 0) {
-        left = next_random(r, left);
-        for (int word = 0; word < SET_WORDS; word++) {
-            for (uint32_t bits = among->bits[word]; bits != 0; bits &= bits - 1) {
-                if (left == 0) {
-                    return 32 * word + lowest_bit(bits);
-                }
-                left--;
-            }
+        int turn = first_in(among);
+        for (left = next_random(r, left); left > 0; left--) {
+            turn = next_in(among, turn);
         }
+        return turn;
     }
     return NOBODY;
 }

@@ -117,6 +117,8 @@ def check_changes(layout: Layout) -> str:
         if item.name in actions
     ]
     text = _CHECK.replace("@asked@", ", ".join(layout.events[event] for event in asked))
-    return text.replace("@open@", "\n".join(is_open)).replace("@P@_IS_LAYER", str(int(layout.is_layer))).replace(
-        "@P@_IS_SMALL", str(int(is_small(layout)))
+    return (
+        text.replace("@open@", "\n".join(is_open))
+        .replace("@P@_IS_LAYER", str(int(layout.is_layer)))
+        .replace("@P@_IS_SMALL", str(int(is_small(layout))))
     )

@@ -18,7 +18,7 @@ MANY = 16
 """Number of functions that are alike from which one does for all: fewer are easier to read one by one."""
 
 _PIECES = re.compile(
-    r'/\*.*?\*/|"(?:[^"\\]|\\.)*"|\b(?P<base>s->|old\.)(?P<member>\w+)'
+    r'/\*.*?\*/|"(?:[^"\\]|\\.)*"|\bU?INT\d+_C\((?P<wide>\w+)\)|\b(?P<base>s->|old\.)(?P<member>\w+)'
     r"|(?P<word>[A-Za-z_]\w*|\d(?:[\w.]|(?<=[eE])[+-])*)"
 )
 _OLD = "    const state_t old = r->state;"
@@ -136,6 +136,8 @@ class Sharing:
                 found, kind = _Piece(text, match["member"], base), f"{base}{self._types[match['member']]}"
             elif text in self._constants or text.isdigit():
                 found, kind = _Piece(text, self._constants[text] if text in self._constants else int(text)), "#"
+            elif text.startswith("INT64") and match["wide"].isdigit():
+                found, kind = _Piece(text, int(match["wide"])), "##"
             else:
                 return text
             if texts is not None:
@@ -174,7 +176,7 @@ class Sharing:
                     case "s->":
                         place = f"{'PLACE' if is_writing else 'READ'}({type_}, s, {name})"
                     case _:
-                        place = name
+                        place = f"((int64_t){name})" if piece.text.startswith("INT64") else name
             if piece.base == "old.":
                 type_ = self._types[str(piece.value)]
                 place = was.setdefault(place, (f"was_{len(was) + 1}", type_))[0]

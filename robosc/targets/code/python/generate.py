@@ -140,7 +140,6 @@ def _supervisor_title(writer: Writer) -> list[str]:
 
 def _class(writer: Writer) -> list[str]:
     model, conditions = writer.model, writer.conditions
-    requested = [item.name for item in model.communications if ("provide", item.name) in writer.layout.methods]
     allows = [conditions.allow_method(event) for event in writer.layout.executable.issued]
     description = describe(writer.layout.supervisor)
     requests, silent = _allow_names(writer, description)
@@ -163,11 +162,11 @@ def _class(writer: Writer) -> list[str]:
     ]
     for identifier, batch in batches(description.communications).items():
         methods.append(receive_method(writer, identifier, tuple(event for _, event in batch)))
-    methods += [provide_method(writer, name) for name in requested]
-    methods += [conditions.requirements_method(name) for name in requested]
-    methods += [conditions.conjuncts_method(name) for name in requested]
+    methods += [provide_method(writer, name) for name in writer.layout.named("provide")]
+    methods += [conditions.requirements_method(name) for name in writer.layout.named("requirements")]
+    methods += [conditions.conjuncts_method(name) for name in writer.layout.named("conjuncts")]
     methods += [matches_method(writer, item) for item in model.communications if item.when is not None]
-    methods += [limits_method(writer, name) for purpose, name in writer.layout.methods if purpose == "limits"]
+    methods += [limits_method(writer, name) for name in writer.layout.named("limits")]
     if writer.layout.supervisor.strategy is not None:
         methods += strategy_methods(writer, writer.layout.supervisor.strategy)
     methods += conditions.nodes.values()
@@ -292,7 +291,7 @@ def receive(self, identifier, data):
 
 def provide(self, communication):
     """Return data for a request in the current state: (is known, data)."""
-    return self._provide[communication]()
+    return self._provide[communication]() if communication in self._provide else (True, None)
 
 def matches(self, communication, data):
     """Return whether a request is a communication's, by its condition `when`."""
@@ -304,9 +303,9 @@ def limits(self, communication):
 
 def requirements(self, communication):
     """Return for each requirement on a request whether it holds now."""
-    return self._requirements[communication]()
+    return self._requirements[communication]() if communication in self._requirements else ()
 
 def conjuncts(self, communication):
     """Return for each top-level conjunct of those requirements whether it holds now."""
-    return self._conjuncts[communication]()'''.split("\n\n")
+    return self._conjuncts[communication]() if communication in self._conjuncts else ()'''.split("\n\n")
 ]

@@ -47,7 +47,8 @@ class Layout:
         locations: Attribute of each automaton's location: components by name, `service s`, `action a`.
         variables: Attribute and type of each variable, by component and variable.
         methods: Method by (purpose, event or communication); purposes are `allow`, `read`, `step`,
-            `provide`, `requirements`, `conjuncts`, `matches`; and `receive` with an identifier.
+            `provide`, `requirements`, `conjuncts`, `matches` and `limits` where there are any; and `receive` with an
+            identifier.
         converters: Function that makes each enum out of received data.
         memory: Attribute of each place of the memory of goals, by its name.
     """
@@ -63,6 +64,10 @@ class Layout:
     def model(self) -> Model:
         """The model."""
         return self.supervisor.model
+
+    def named(self, purpose: str) -> list[str]:
+        """The communications that have a method for a purpose."""
+        return [subject for found, subject in self.methods if found == purpose]
 
     @property
     def executable(self) -> ExecutableSystem:
@@ -102,7 +107,9 @@ def _method_names(supervisor: Supervisor, members: PythonNamer) -> dict[tuple[st
             methods[purpose, event.name] = members.name(f"{purpose}_{event.name.replace('.', '_')}")
     for item in model.communications:
         if EventKind.REQUEST in EVENT_KINDS[item.kind]:
-            for purpose in ("provide", "requirements", "conjuncts"):
+            purposes = ["provide"] if model.provides_for(item.name) else []
+            purposes += ["requirements", "conjuncts"] if model.requirements_on(item.name) else []
+            for purpose in purposes:
                 methods[purpose, item.name] = members.name(f"{purpose}_{item.name}")
         if item.when is not None:
             methods["matches", item.name] = members.name(f"matches_{item.name}")

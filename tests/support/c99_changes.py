@@ -48,7 +48,11 @@ static void check_changes(void)
         bool is_known = false;
 #if !@P@_IS_LAYER && @P@_REQUEST_COUNT > 0
         const int request = number - @P@_SILENT_COUNT;
+#if @P@_IS_SMALL
+        is_known = request >= 0 && is_member(&r.candidates, request);
+#else
         is_known = request >= 0 && is_member(&r.candidates, r.turns[request]);
+#endif
 @open@
 #endif
         if (!is_member(&r.stale, number) && is_enabled != is_known) {
@@ -61,6 +65,18 @@ static void check_changes(void)
     check_set("fresh", &r.fresh);
     check_set("withheld", &r.withheld);
     check_set("unchanging", &r.unchanging);
+#if @P@_IS_SMALL
+    for (int request = 0; request < @P@_REQUEST_COUNT && r.is_started; request++) {
+        for (int other = 0; other < request; other++) {
+            if (r.turns[request] == r.turns[other]) {
+                complain("equal turns", request);
+            }
+        }
+        if (r.fault == @P@_FAULT_NONE && (is_member(&r.fresh, request) || is_member(&r.withheld, request))) {
+            complain("left from a decision", request);
+        }
+    }
+#else
     for (int turn = 0; turn < 2 * @P@_REQUEST_COUNT && r.is_started; turn++) {
         const bool has_owner = turn < r.next_turn && r.owners[turn] >= 0;
         if (has_owner ? r.turns[r.owners[turn]] != turn : is_member(&r.candidates, turn)) {
@@ -70,6 +86,7 @@ static void check_changes(void)
             complain("left from a decision", turn);
         }
     }
+#endif
 #endif
 #if @P@_TOPIC_COUNT > 0
     check_set("acting topics", &r.acting_topics);

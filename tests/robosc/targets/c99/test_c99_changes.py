@@ -126,9 +126,10 @@ _SPEAKER = """
 """
 
 
-def test_turns_go_round_as_the_words_say(tmp_path: Path) -> None:
-    """The turns are numbered anew several times, while requests come and go."""
-    parts, decisions = 40, 400
+@pytest.mark.parametrize("parts", [12, 40], ids=["small", "large"])
+def test_turns_go_round_as_the_words_say(parts: int, tmp_path: Path) -> None:
+    """The turns of a large robot are numbered anew several times, while requests come and go."""
+    decisions = 400
     supervisor = unsupervised(f"robot Many {{{''.join(_SPEAKER.format(number) for number in range(parts))}}}")
     prefix = make_layout(supervisor).prefix
     cases = "\n".join(f"        case {n}: {prefix}_receive_flip{n}(&r, 0); break;" for n in range(parts))

@@ -358,13 +358,18 @@ typedef struct {
 #if ROBOT_REQUEST_COUNT > 0
     int64_t decision;
     int64_t favoured[ROBOT_REQUEST_COUNT]; /* the decision at which a request was last issued for being new */
+#if ROBOT_IS_SMALL
+    int64_t turns[ROBOT_REQUEST_COUNT];    /* by request: the one with the least goes first */
+    robot_set_t candidates; /* requests that may be issued */
+#else
     int32_t turns[ROBOT_REQUEST_COUNT];    /* by request: the one with the least goes first */
     int32_t owners[2 * ROBOT_REQUEST_COUNT]; /* the request that has each turn, or -1 */
     int next_turn;
     int listed_count;       /* number of requests in the list of the policy `priority`, which have the first turns */
     robot_set_t candidates; /* turns of the requests that may be issued */
+#endif
     robot_set_t fresh;      /* those of them that could not be at the last decision */
-    robot_set_t withheld;   /* turns of requests that turned out at this decision to have no data, or unfit */
+    robot_set_t withheld;   /* those that turned out at this decision to have no data, or unfit */
     robot_set_t unchanging; /* requests that were issued in this stable state and changed nothing */
 #endif
 #else

@@ -84,7 +84,7 @@ def test_nearly_all_functions_of_equal_parts_are_shared() -> None:
     shared = re.findall(r"^static \w+ (alike_\d+)\(", source, re.MULTILINE)
     own = re.findall(r"^static \w+ \w+_(?:takes|allows)_\w+\(", source, re.MULTILINE)
     assert len(shared) == len(set(shared)) > 10
-    # What the odd part does with numbers that are no integers.
+    # Those of the odd part that have numbers which are no integers.
     assert 0 < len(own) < 8, own
     assert f"Does for {PARTS} events that are alike; what stands here are the words of go0.request." in source
 

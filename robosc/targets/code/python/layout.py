@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from robosc.automata.executable import CALLED_KINDS, ExecutableSystem
 from robosc.automata.plants import communication_plant_name
 from robosc.expressions import Type
+from robosc.model.received import converted_paths
 from robosc.model.structure import EVENT_KINDS, CommunicationKind, EventKind, Model
 from robosc.supervisor import Supervisor
 from robosc.targets.code.python.naming import PythonNamer
@@ -66,7 +67,7 @@ class Layout:
         return self.supervisor.model
 
     def named(self, purpose: str) -> list[str]:
-        """The communications that have a method for a purpose."""
+        """What has a method for a purpose: events, communications or identifiers."""
         return [subject for found, subject in self.methods if found == purpose]
 
     @property
@@ -103,7 +104,8 @@ def _method_names(supervisor: Supervisor, members: PythonNamer) -> dict[tuple[st
     model = supervisor.model
     methods = {}
     for event in supervisor.executable.events.values():
-        for purpose in ("allow" if event.is_issued else "read", "step"):
+        read = ["read"] if converted_paths(model, event.name) else []
+        for purpose in (*(["allow"] if event.is_issued else read), "step"):
             methods[purpose, event.name] = members.name(f"{purpose}_{event.name.replace('.', '_')}")
     for item in model.communications:
         if EventKind.REQUEST in EVENT_KINDS[item.kind]:

@@ -67,7 +67,7 @@ class Layout:
         return self.supervisor.model
 
     def named(self, purpose: str) -> list[str]:
-        """What has a method for a purpose: events, communications or identifiers."""
+        """Events, communications or identifiers that have a method for a purpose."""
         return [subject for found, subject in self.methods if found == purpose]
 
     @property

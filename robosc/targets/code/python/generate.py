@@ -151,7 +151,7 @@ def _class(writer: Writer) -> list[str]:
         step_method(writer, event, event in alone)
         for event in (*writer.layout.executable.issued, *writer.layout.executable.received)
     ]
-    # Nothing but a step stands for such a message.
+    # The messages that stand for a step alone.
     whole = {name: events[0] for name, events in received.items() if writer.whole.issuperset(events)}
     methods = [
         _constructor(writer, description, whole),

@@ -1,6 +1,7 @@
 """Check in C, after every command, that what a generated executor knows of its events is what a full look finds."""
 
 from robosc.model.structure import CommunicationKind, EventKind
+from robosc.targets.code.c.header import is_small
 from robosc.targets.code.c.layout import Layout
 
 _CHECK = """
@@ -12,17 +13,28 @@ static void complain(const char *what, int number)
 #if @P@_SET_COUNT > 0
 static bool is_member(const @p@_set_t *set, int number)
 {
-    return (set->bits[number / 32] >> (number % 32) & 1U) != 0;
+#if !@P@_IS_SMALL
+    return (set->bits[number / @P@_WORD_BITS] >> (number % @P@_WORD_BITS) & 1U) != 0;
+#else
+    return (*set >> number & 1U) != 0;
+#endif
 }
 
-/* The bits of words are set for those words alone that are not zero. */
+/* The bits of words are set for those words alone that are not zero, and no bit is that of no number. */
 static void check_set(const char *name, const @p@_set_t *set)
 {
-    for (int word = 0; word < (@P@_SET_COUNT + 31) / 32; word++) {
-        if (@P@_SET_COUNT > 32 && (set->used[word / 32] >> (word % 32) & 1U) != (set->bits[word] != 0)) {
+#if !@P@_IS_SMALL
+    const int size = @P@_WORD_BITS;
+    for (int word = 0; word < (@P@_SET_COUNT + size - 1) / size; word++) {
+        if ((set->used[word / size] >> (word % size) & 1U) != (set->bits[word] != 0)) {
             complain(name, word);
         }
     }
+#else
+    if ((uint64_t)*set >> @P@_SET_COUNT != 0) {
+        complain(name, -1);
+    }
+#endif
 }
 
 #endif
@@ -36,7 +48,11 @@ static void check_changes(void)
         bool is_known = false;
 #if !@P@_IS_LAYER && @P@_REQUEST_COUNT > 0
         const int request = number - @P@_SILENT_COUNT;
+#if @P@_IS_SMALL
+        is_known = request >= 0 && is_member(&r.candidates, request);
+#else
         is_known = request >= 0 && is_member(&r.candidates, r.turns[request]);
+#endif
 @open@
 #endif
         if (!is_member(&r.stale, number) && is_enabled != is_known) {
@@ -49,6 +65,18 @@ static void check_changes(void)
     check_set("fresh", &r.fresh);
     check_set("withheld", &r.withheld);
     check_set("unchanging", &r.unchanging);
+#if @P@_IS_SMALL
+    for (int request = 0; request < @P@_REQUEST_COUNT && r.is_started; request++) {
+        for (int other = 0; other < request; other++) {
+            if (r.turns[request] == r.turns[other]) {
+                complain("equal turns", request);
+            }
+        }
+        if (r.fault == @P@_FAULT_NONE && (is_member(&r.fresh, request) || is_member(&r.withheld, request))) {
+            complain("left from a decision", request);
+        }
+    }
+#else
     for (int turn = 0; turn < 2 * @P@_REQUEST_COUNT && r.is_started; turn++) {
         const bool has_owner = turn < r.next_turn && r.owners[turn] >= 0;
         if (has_owner ? r.turns[r.owners[turn]] != turn : is_member(&r.candidates, turn)) {
@@ -58,6 +86,7 @@ static void check_changes(void)
             complain("left from a decision", turn);
         }
     }
+#endif
 #endif
 #if @P@_TOPIC_COUNT > 0
     check_set("acting topics", &r.acting_topics);
@@ -105,4 +134,8 @@ def check_changes(layout: Layout) -> str:
         if item.name in actions
     ]
     text = _CHECK.replace("@asked@", ", ".join(layout.events[event] for event in asked))
-    return text.replace("@open@", "\n".join(is_open)).replace("@P@_IS_LAYER", str(int(layout.is_layer)))
+    return (
+        text.replace("@open@", "\n".join(is_open))
+        .replace("@P@_IS_LAYER", str(int(layout.is_layer)))
+        .replace("@P@_IS_SMALL", str(int(is_small(layout))))
+    )

@@ -48,6 +48,11 @@ class WatchingSystem(InterpretedSystem):
         super().restart()
         self._watch_anew()
 
+    def snapshot(self) -> Snapshot:
+        """Return the state with the memory of goals, as a value that `restore` takes."""
+        found = super().snapshot()
+        return Snapshot(dict(found.state), found.goals)
+
     def restore(self, snapshot: Snapshot) -> None:
         """Return to a state that `snapshot` has returned."""
         super().restore(snapshot)
@@ -74,6 +79,8 @@ class WatchingSystem(InterpretedSystem):
         return None
 
     def _watch_anew(self) -> None:
+        # A copy of the initial state, in which places are written: to copy all of them takes long if they are many.
+        self._state = dict(self._initial)
         self._allowed: set[int] = set()
         self._turned: set[int] = set()
         self._doubt_everything()
@@ -104,8 +111,11 @@ class WatchingSystem(InterpretedSystem):
                 self._watchers.setdefault(place, set()).add(number)
 
     def _enter(self, successor: Successor) -> None:
-        super()._enter(successor)
-        for place in successor.changed():
+        changed = successor.changed()
+        if changed:
+            self.changes += 1
+        self._state |= successor.written
+        for place in changed:
             for number in self._watchers.pop(place, ()):
                 if number >= 0:
                     self._doubtful_requests.add(number)

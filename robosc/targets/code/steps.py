@@ -43,6 +43,7 @@ class StepWriter(ABC):
         self._executable = executable
         self._before, self._values, self._after = before, values, after
         self._namer = namer
+        self._conditions = accepted(executable, before) if executable.is_issued else []
         self.may_skip = False
 
     @abstractmethod
@@ -80,9 +81,8 @@ class StepWriter(ABC):
         found: list[Statement] = []
         if (moves := self._executable.moves) is not None:
             found.append(when(self._before.in_one_of(moves.plant, moves.sources, False), refuse))
-        if self._executable.is_issued:
-            for words, condition in accepted(self._executable, self._before):
-                found += [Comment(words), when(self._before.negated(condition), refuse)]
+        for words, condition in self._conditions:
+            found += [Comment(words), when(self._before.negated(condition), refuse)]
         return found
 
     def _plant(self) -> list[Statement]:
@@ -102,6 +102,10 @@ class StepWriter(ABC):
                 test = self._before.in_one_of(participant.component, states) if len(states) < count else TRUE_CODE
                 branches.append((test, body))
                 tested += len(states)
+        for test, body in branches:
+            # The event is refused otherwise.
+            if any(test == condition for _, condition in self._conditions):
+                return body
         return self._choice(branches, tested == count)
 
     def _transition(self, participant: Participant, states: tuple[str, ...], transition: Transition) -> Block:

@@ -44,30 +44,33 @@ def head(supervisor: Supervisor, begin: str = "/* ", rest: str = "   ", end: str
     )
 
 
+SMALL = 32
+"""Size of the sets of a small robot, whose code is simpler: one word of a small processor."""
+
+
 def runtime_text(layout: Layout, name: str, package: str = "robosc.targets.code.c") -> str:
     """A file of a package's runtime for one robot: its prefix in the place of `robot_`, and its deployment's parts."""
     prefixes = {"robot_": f"{layout.prefix}_", "ROBOT_": f"{layout.upper}_"}
+    facts = (layout.is_layer, layout.supervisor.strategy is not None, is_small(layout))
     return "".join(
         f"{prefixes[word[:6]]}{word[6:]}" if word[:6] in prefixes and word[6:] else word
-        for word in _words(package, name, layout.is_layer, layout.supervisor.strategy is not None)
+        for word in _words(package, name, *facts)
     )
 
 
 @cache
-def _words(package: str, name: str, is_layer: bool, has_strategy: bool) -> tuple[str, ...]:
+def _words(package: str, name: str, *facts: bool) -> tuple[str, ...]:
     """A file of a package's runtime as the names in it, in code and in comments, and what stands between them."""
     text = resources.files(f"{package}.runtime").joinpath(name).read_text(encoding="utf-8")
-    kept = decided(text, is_layer, has_strategy)
+    kept = decided(text, *facts)
     return tuple("".join(run) for _, run in groupby(kept, key=lambda char: char == "_" or char.isalnum()))
 
 
-def decided(text: str, is_layer: bool, has_strategy: bool) -> str:
+def decided(text: str, is_layer: bool, has_strategy: bool, is_small: bool) -> str:
     """The lines of a runtime file for a supervisor: the conditions of its `#if` are decided here, not by a compiler."""
+    facts = {"IS_LAYER": is_layer, "HAS_STRATEGY": has_strategy, "IS_SMALL": is_small}
     conditions = {
-        "#if ROBOT_IS_LAYER": is_layer,
-        "#if !ROBOT_IS_LAYER": not is_layer,
-        "#if ROBOT_HAS_STRATEGY": has_strategy,
-        "#if !ROBOT_HAS_STRATEGY": not has_strategy,
+        f"#if {sign}ROBOT_{name}": is_true != bool(sign) for name, is_true in facts.items() for sign in ("", "!")
     }
     lines: list[str] = []
     # For each `#if` around: whether its part is kept; None if it stays for the compiler.
@@ -211,6 +214,11 @@ def counts(layout: Layout) -> dict[str, int]:
     }
 
 
+def is_small(layout: Layout) -> bool:
+    """Return True if each set of numbers of the engine fits into a word of 32 bits."""
+    return counts(layout)["SET"] <= SMALL
+
+
 def _counts(layout: Layout) -> list[str]:
     return [f"#define {layout.upper}_{name}_COUNT {count}" for name, count in counts(layout).items()]
 
@@ -351,20 +359,26 @@ def _stored_type(type_: Type) -> str:
     return width(len(type_.values)) if isinstance(type_, EnumType) else plain_type(type_)
 
 
-def _state(layout: Layout) -> list[str]:
-    body = []
+def state_members(layout: Layout) -> list[tuple[str, str, str]]:
+    """The type and the name of each member of the state, and words on it."""
+    found = []
     for component, behaviour in layout.executable.behaviours:
-        body.append(f"{width(len(behaviour.states))} {layout.locations[component]}; /* state of {component} */")
+        found.append((width(len(behaviour.states)), layout.locations[component], f"state of {component}"))
         for variable in behaviour.variables:
             name, type_ = layout.variables[component, variable.name]
-            body.append(f"{declared(_stored_type(type_), name)}; /* {component}.{variable.name} */")
+            found.append((_stored_type(type_), name, f"{component}.{variable.name}"))
     for item in layout.model.communications:
         if item.kind in CALLED_KINDS:
-            body.append(f"uint8_t {layout.locations[communication_plant_name(item)]}; /* {item.kind} {item.name} */")
+            found.append(("uint8_t", layout.locations[communication_plant_name(item)], f"{item.kind} {item.name}"))
     if layout.supervisor.strategy is not None:
-        body += [f"bool {layout.variables[MEMORY, name][0]}; /* {name} */" for name in remembered_places(layout)]
+        found += [("bool", layout.variables[MEMORY, name][0], name) for name in remembered_places(layout)]
         aims = layout.executable.obligations.aims
-        body.append(f"{width(len(aims))} {layout.mode}; /* number of what is approached, of {counted(aims)} */")
+        found.append((width(len(aims)), layout.mode, f"number of what is approached, of {counted(aims)}"))
+    return found
+
+
+def _state(layout: Layout) -> list[str]:
+    body = [f"{declared(type_, name)}; /* {words} */" for type_, name, words in state_members(layout)]
     return [
         "/* The state: where everything is. */",
         "typedef struct {",

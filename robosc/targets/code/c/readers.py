@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from robosc.targets.code.c.layout import width
+from robosc.targets.code.expressions import Code, Sort, call, integer, literal, variable
 
 _FEW = 8
 
@@ -14,12 +15,16 @@ class Readers:
     is read by many, more than an eighth of all events, all of them are asked anew: so the table remains small in a
     model in which everything depends on everything.
 
+    A small robot needs no table: there the readers are the bits of a number.
+
     Args:
+        is_small: True for the code of a small robot.
         read: For each event that is asked, in the order of their numbers, what its permission reads and calls.
         uses: For each function, what it reads and calls.
     """
 
-    def __init__(self, read: Sequence[set[str]], uses: Mapping[str, set[str]]) -> None:
+    def __init__(self, is_small: bool, read: Sequence[set[str]], uses: Mapping[str, set[str]]) -> None:
+        self._is_small = is_small
         self._count = len(read)
         self._readers: dict[str, list[int]] = {}
         for number, words in enumerate(read):
@@ -29,18 +34,21 @@ class Readers:
         self._names: dict[int, list[str]] = {}
         self._length = 0
 
-    def of(self, place: str) -> int | None:
-        """The number of a place's entry in the table; None if everything is to be asked."""
+    def noted(self, place: str) -> Code:
+        """The call that notes another value of a place."""
         found = tuple(self._readers.get(place, ()))
+        if self._is_small:
+            bits = sum(1 << number for number in found)
+            return call("changed", variable("r"), literal(f"UINT32_C({bits:#x})", Sort.INTEGER))
         if len(found) > max(_FEW, self._count // 8):
-            return None
+            return call("all_changed", variable("r"))
         if found not in self._places:
             self._places[found] = self._length
             self._length += 1 + len(found)
         names = self._names.setdefault(self._places[found], [])
         if place not in names:
             names.append(place)
-        return self._places[found]
+        return call("changed", variable("r"), integer(self._places[found]))
 
     def lines(self) -> list[str]:
         """The table; nothing where nothing is ever asked, or nothing ever changes."""

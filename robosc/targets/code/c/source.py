@@ -1,6 +1,6 @@
 """The generated C file: tables, the functions of the model, the engine, and the functions that take received data."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 
 from robosc.automata.executable import CALLED_KINDS
@@ -8,12 +8,22 @@ from robosc.automata.plants import communication_plant_name
 from robosc.expressions import ArrayType, BooleanType, DoubleType, EnumType, IntegerType, NoneType, ObjectType, Type
 from robosc.model.received import converted_paths, required_parts
 from robosc.model.structure import CommunicationKind, EventKind, is_tau
+from robosc.targets.code.c.alike import MACROS, Family, Sharing
 from robosc.targets.code.c.conditions import CConditions
 from robosc.targets.code.c.expressions import number_code
-from robosc.targets.code.c.header import batch, batch_parameters, counts, head, receive_head, reply_head, runtime_text
+from robosc.targets.code.c.header import (
+    batch,
+    batch_parameters,
+    counts,
+    head,
+    is_small,
+    receive_head,
+    reply_head,
+    runtime_text,
+)
 from robosc.targets.code.c.helpers import HELPERS, called
 from robosc.targets.code.c.layer_source import request_functions
-from robosc.targets.code.c.layout import Layout, data_that_comes, event_data
+from robosc.targets.code.c.layout import Layout, data_that_comes, event_data, width
 from robosc.targets.code.c.limits import HELPERS_TEXT as LIMITING
 from robosc.targets.code.c.limits import get_function, limit_function, limited, set_function
 from robosc.targets.code.c.provide import default_function, provide_function
@@ -40,11 +50,14 @@ def source_file(unit: Unit) -> str:
     """The text of `<robot>.c`."""
     layout = unit.layout
     conditions = CConditions(unit)
-    allows = [conditions.allow_function(event) for event in layout.executable.issued]
-    readers = Readers([conditions.reads[event] for event in _asked(layout)], unit.uses)
+    allowing = {event: conditions.allow_function(event) for event in layout.executable.issued}
+    readers = Readers(is_small(layout), [conditions.reads[event] for event in _asked(layout)], unit.uses)
     steppers = [Stepper(unit, event, readers) for event in layout.events if not _never_taken(layout, event)]
-    steps = [item.step_function() for item in steppers]
-    happens = [item.happen_function() for item in steppers if _happens(layout, item.event)]
+    sharing = Sharing(layout)
+    allows, steps = (
+        sharing.family(functions) for functions in (allowing, {item.event: item.step_function() for item in steppers})
+    )
+    happens = [item.happen_function(steps) for item in steppers if _happens(layout, item.event)]
     messages = layout.of_kind(CommunicationKind.INCOMING_MESSAGE)
     provided = [] if layout.is_layer else [provide_function(unit, item) for item in layout.requests]
     provided += [] if layout.is_layer else [default_function(unit, item) for item in messages]
@@ -64,7 +77,16 @@ def source_file(unit: Unit) -> str:
     engine = [runtime_text(layout, f"{part}.c").rstrip().splitlines() for part in parts]
     asked = request_functions(unit) if layout.is_layer else []
     ends = [*engine, *happens, *asked, *_entries(layout), *_names(layout)]
-    rest = [*allows, *steps, *provided, *held, *limiting, *_dispatchers(unit), *chosen, *ends]
+    rest = [
+        *allows.blocks,
+        *steps.blocks,
+        *provided,
+        *held,
+        *limiting,
+        *_dispatchers(unit, allows, steps),
+        *chosen,
+        *ends,
+    ]
     converters = {layout.converters[enum.name]: converter(unit, enum) for enum in layout.model.enums}
     functions = {
         **HELPERS,
@@ -75,7 +97,7 @@ def source_file(unit: Unit) -> str:
     needed = called(unit.used, unit.uses)
     heads = [f"{converter_head(unit, enum)};" for enum in layout.model.enums if layout.converters[enum.name] in needed]
     texts = [*heads, *(text for name, text in functions.items() if name in needed)]
-    start = [_prologue(layout, readers), runtime_text(layout, "sets.c").rstrip()]
+    start = [_prologue(layout, readers, bool(allows.rows or steps.rows)), runtime_text(layout, "sets.c").rstrip()]
     return "\n\n".join([*start, *texts, *("\n".join(block) for block in rest)]) + "\n"
 
 
@@ -96,7 +118,7 @@ def _happens(layout: Layout, event: str) -> bool:
     return not found.is_issued and found.kind is not EventKind.ERROR
 
 
-def _prologue(layout: Layout, readers: Readers) -> str:
+def _prologue(layout: Layout, readers: Readers, is_sharing: bool) -> str:
     prefix = layout.prefix
     numbers = counts(layout)
     with_data = sum(_happens(layout, event) and bool(converted_paths(layout.model, event)) for event in layout.events)
@@ -133,6 +155,8 @@ def _prologue(layout: Layout, readers: Readers) -> str:
             "    bool is_enum_unknown;",
             "} notes_t;",
         ]
+    if is_sharing:
+        lines += ["", *MACROS]
     table = readers.lines()
     return "\n".join([*lines, *_unknown_constants(layout), *_tables(layout, numbers), *([""] if table else []), *table])
 
@@ -265,27 +289,58 @@ def _switch(head_: str, parameters: str, subject: str, cases: Iterable[tuple[obj
     return [head_, "{", *indent([*statement_lines(unused(*parameters.split())), *lines, *ends]), "}"]
 
 
-def _dispatchers(unit: Unit) -> list[list[str]]:
+def _by_event(
+    layout: Layout, head_: str, name: str, parameter: str, cases: Mapping[str, str], family: Family, default: str
+) -> list[str]:
+    """The function that calls another one for an event, its own or that which does for many.
+
+    Args:
+        layout: Names.
+        head_: Its head.
+        name: Name of the table of those that do for many.
+        parameter: Its parameter besides the event.
+        cases: The statement for each event with a function of its own.
+        family: The functions.
+        default: The statement for all other events.
+    """
+    own = [(layout.events[event], text) for event, text in cases.items() if event not in family.rows]
+    switch = _switch(head_, f"{parameter} event", "event", own, default)
+    rows = [family.row_of(event) if event in cases else (0, 0) for event in layout.events]
+    numbers = sorted({number for number, _ in rows if number})
+    if not numbers:
+        return switch
+    shared = _switch("", "", f"{name}[event].function", [family.case(number, parameter) for number in numbers], "")
+    types = [width(1 + max(column)) for column in zip(*rows, strict=True)]
+    table = _table([f"{types[0]} function", f"{types[1]} row"], name, [[*map(str, row)] for row in rows], _DOES)
+    test = f"if ((size_t)event < sizeof {name} / sizeof *{name}) {{"
+    lines = [test, *indent([f"const int row = {name}[event].row;", *(line[4:] for line in shared[2:-1])]), "}"]
+    return [*table[1:], "", *switch[:2], *indent(lines), *switch[2:]]
+
+
+_DOES = "Number of the function that does for an event, or 0; the row of its table."
+
+
+def _dispatchers(unit: Unit, allows: Family, steps: Family) -> list[list[str]]:
     """Return the functions by which the engine calls the model."""
     layout = unit.layout
-    function, events = layout.function, layout.events
+    function = layout.function
     state, event, data = "const state_t *s", f"{layout.prefix}_event_t event", f"{layout.prefix}_request_t *data"
-    allowed = [(events[event], f"return {function('allows', event)}(s);") for event in layout.executable.issued]
+    allowed = {event: f"return {function('allows', event)}(s);" for event in layout.executable.issued}
     head_ = f"static bool is_allowed({state}, {event})"
     start = initial_state(layout.executable, Reading(unit), partial(_initial, layout))
     if layout.supervisor.strategy is not None:
         start += forgotten(unit)
     initial = unit.definition("static void set_initial(state_t *s)", [*unused("s"), *start])
     result = [initial, _same(layout), _model_settings(layout)]
-    result.append(_switch(head_, "s event", "event", allowed, "return false;"))
+    result.append(_by_event(layout, head_, "ALLOWS", "s", allowed, allows, "return false;"))
     if layout.requests or layout.description.taus:
-        taken = [
-            (events[event.name], f"return {function('takes', event.name)}(r);")
+        taken = {
+            event.name: f"return {function('takes', event.name)}(r);"
             for event in layout.executable.events.values()
             if (event.is_issued and not _never_taken(layout, event.name)) or event.kind is EventKind.ERROR
-        ]
+        }
         head_ = f"static int take_event({layout.prefix}_t *r, {event})"
-        result.append(_switch(head_, "r event", "event", taken, "return REFUSED;"))
+        result.append(_by_event(layout, head_, "TAKES", "r", taken, steps, "return REFUSED;"))
     requests = list(enumerate(layout.requests))
     if requests and not layout.is_layer:
         given = [(place, f"return {function('provides', item.name)}(s, data);") for place, item in requests]

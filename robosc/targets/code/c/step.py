@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from robosc.expressions import ArrayType, BooleanType, DoubleType, EnumType, IntegerType, Type
 from robosc.model.received import Path, converted_paths
 from robosc.model.structure import is_tau
+from robosc.targets.code.c.alike import Family
 from robosc.targets.code.c.expressions import c_type, number_code
 from robosc.targets.code.c.layout import event_data, width
 from robosc.targets.code.c.naming import CNamer
@@ -23,7 +24,6 @@ from robosc.targets.code.expressions import (
     Sort,
     bounds_of,
     call,
-    integer,
     literal,
     operation,
     variable,
@@ -73,7 +73,7 @@ class Stepper(StepWriter):
         head = f"static int {self.unit.layout.function('takes', self.event)}({', '.join(parameters)})"
         return self.unit.definition(head, [*start, *body, Return(_SKIPPED if self.may_skip else _NOTHING)])
 
-    def happen_function(self) -> list[str]:
+    def happen_function(self, steps: Family) -> list[str]:
         """The function that converts what came with an event of the environment and takes it."""
         layout, name = self.unit.layout, self.unit.layout.events[self.event]
         parameters = [f"{layout.prefix}_t *r"]
@@ -87,7 +87,8 @@ class Stepper(StepWriter):
                 arguments += [reader.read(path) for path in self.paths]
                 counted = variable(f"notes.is_unknown && !notes_count(r, {name}, &notes, may_keep)")
                 body += [NO_NOTES, *reader.default(), *reader.take(), when(counted, Return(FALSE_CODE))]
-        taken = call(layout.function("takes", self.event), *arguments)
+        function, row = steps.call(self.event, layout.function("takes", self.event))
+        taken = call(function, *arguments, *map(variable, row))
         body += [Do(call("happened", variable("r"), variable(name), taken)), Return(TRUE_CODE)]
         head = f"static bool {layout.function('happens', self.event)}({', '.join([*parameters, 'bool may_keep'])})"
         return self.unit.definition(head, body)
@@ -103,9 +104,7 @@ class Stepper(StepWriter):
         return declared(f"const {self.unit.layout.raw(type_)} *" if is_array else c_type(code.sort), code.word)
 
     def _write(self, place: Code, value: Code, may_stay: bool) -> list[Statement]:
-        readers = self.readers.of(place.word)
-        noted = [] if readers is None else [integer(readers)]
-        changed = Do(call("changed" if noted else "all_changed", variable("r"), *noted))
+        changed = Do(self.readers.noted(place.word))
         if not may_stay:
             return [Assign(place, value), changed]
         # The new one of equal numbers counts, too, such as -0.0 after 0.0.

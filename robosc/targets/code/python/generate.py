@@ -1,6 +1,7 @@
 """The generated `supervisor.py`: a class that implements `robosc.execution.runtime.protocol.ControlledSystem`."""
 
 import textwrap
+from collections.abc import Mapping
 
 from robosc._version import __version__
 from robosc.automata.executable import CALLED_KINDS
@@ -140,13 +141,20 @@ def _supervisor_title(writer: Writer) -> list[str]:
 
 def _class(writer: Writer) -> list[str]:
     model, conditions = writer.model, writer.conditions
-    requested = [item.name for item in model.communications if ("provide", item.name) in writer.layout.methods]
     allows = [conditions.allow_method(event) for event in writer.layout.executable.issued]
     description = describe(writer.layout.supervisor)
     requests, silent = _allow_names(writer, description)
     writer.marks = stale_marks(requests, silent, conditions.reads)
+    received = {name: [event for _, event in batch] for name, batch in batches(description.communications).items()}
+    alone = {events[0] for events in received.values() if len(events) == 1}
+    steps = [
+        step_method(writer, event, event in alone)
+        for event in (*writer.layout.executable.issued, *writer.layout.executable.received)
+    ]
+    # The messages that stand for a step alone.
+    whole = {name: events[0] for name, events in received.items() if writer.whole.issuperset(events)}
     methods = [
-        _constructor(writer, description),
+        _constructor(writer, description, whole),
         _restart(writer, len(requests), len(silent)),
         *_PROTOCOL_METHODS,
         enabled_requests_method(requests),
@@ -157,17 +165,14 @@ def _class(writer: Writer) -> list[str]:
         _signature(writer),
     ]
     methods += allows
-    methods += [read_method(writer, event) for event in writer.layout.executable.received]
-    methods += [
-        step_method(writer, event) for event in (*writer.layout.executable.issued, *writer.layout.executable.received)
-    ]
-    for identifier, batch in batches(description.communications).items():
-        methods.append(receive_method(writer, identifier, tuple(event for _, event in batch)))
-    methods += [provide_method(writer, name) for name in requested]
-    methods += [conditions.requirements_method(name) for name in requested]
-    methods += [conditions.conjuncts_method(name) for name in requested]
+    methods += [read_method(writer, event) for event in writer.layout.named("read")]
+    methods += steps
+    methods += [receive_method(writer, name, tuple(events)) for name, events in received.items() if name not in whole]
+    methods += [provide_method(writer, name) for name in writer.layout.named("provide")]
+    methods += [conditions.requirements_method(name) for name in writer.layout.named("requirements")]
+    methods += [conditions.conjuncts_method(name) for name in writer.layout.named("conjuncts")]
     methods += [matches_method(writer, item) for item in model.communications if item.when is not None]
-    methods += [limits_method(writer, name) for purpose, name in writer.layout.methods if purpose == "limits"]
+    methods += [limits_method(writer, name) for name in writer.layout.named("limits")]
     if writer.layout.supervisor.strategy is not None:
         methods += strategy_methods(writer, writer.layout.supervisor.strategy)
     methods += conditions.nodes.values()
@@ -203,8 +208,9 @@ def _allow_names(writer: Writer, description: Description) -> tuple[list[str], l
     )
 
 
-def _constructor(writer: Writer, description: Description) -> list[str]:
-    methods = writer.layout.methods
+def _constructor(writer: Writer, description: Description, whole: Mapping[str, str]) -> list[str]:
+    steps = {("receive", name): writer.layout.methods["step", event] for name, event in whole.items()}
+    methods = {**writer.layout.methods, **steps}
     tables: dict[str, list[str]] = {}
     for (purpose, subject), method in methods.items():
         tables.setdefault(purpose, []).append(f"{subject!r}: self.{method},")
@@ -276,7 +282,7 @@ def enabled(self, event):
 
 def read(self, event, data):
     """Convert what came with an uncontrollable event; change nothing."""
-    return self._read[event](data)
+    return self._read[event](data) if event in self._read else NO_DATA
 
 def step(self, event, reading=None):
     """Take an event; return the skipped updates, or None if it cannot happen now."""
@@ -292,7 +298,7 @@ def receive(self, identifier, data):
 
 def provide(self, communication):
     """Return data for a request in the current state: (is known, data)."""
-    return self._provide[communication]()
+    return self._provide[communication]() if communication in self._provide else (True, None)
 
 def matches(self, communication, data):
     """Return whether a request is a communication's, by its condition `when`."""
@@ -304,9 +310,9 @@ def limits(self, communication):
 
 def requirements(self, communication):
     """Return for each requirement on a request whether it holds now."""
-    return self._requirements[communication]()
+    return self._requirements[communication]() if communication in self._requirements else ()
 
 def conjuncts(self, communication):
     """Return for each top-level conjunct of those requirements whether it holds now."""
-    return self._conjuncts[communication]()'''.split("\n\n")
+    return self._conjuncts[communication]() if communication in self._conjuncts else ()'''.split("\n\n")
 ]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from robosc.automata.executable import CALLED_KINDS, ExecutableSystem
 from robosc.automata.plants import communication_plant_name
 from robosc.expressions import Type
+from robosc.model.received import converted_paths
 from robosc.model.structure import EVENT_KINDS, CommunicationKind, EventKind, Model
 from robosc.supervisor import Supervisor
 from robosc.targets.code.python.naming import PythonNamer
@@ -47,7 +48,8 @@ class Layout:
         locations: Attribute of each automaton's location: components by name, `service s`, `action a`.
         variables: Attribute and type of each variable, by component and variable.
         methods: Method by (purpose, event or communication); purposes are `allow`, `read`, `step`,
-            `provide`, `requirements`, `conjuncts`, `matches`; and `receive` with an identifier.
+            `provide`, `requirements`, `conjuncts`, `matches` and `limits` where there are any; and `receive` with an
+            identifier.
         converters: Function that makes each enum out of received data.
         memory: Attribute of each place of the memory of goals, by its name.
     """
@@ -63,6 +65,10 @@ class Layout:
     def model(self) -> Model:
         """The model."""
         return self.supervisor.model
+
+    def named(self, purpose: str) -> list[str]:
+        """Events, communications or identifiers that have a method for a purpose."""
+        return [subject for found, subject in self.methods if found == purpose]
 
     @property
     def executable(self) -> ExecutableSystem:
@@ -98,11 +104,14 @@ def _method_names(supervisor: Supervisor, members: PythonNamer) -> dict[tuple[st
     model = supervisor.model
     methods = {}
     for event in supervisor.executable.events.values():
-        for purpose in ("allow" if event.is_issued else "read", "step"):
+        read = ["read"] if converted_paths(model, event.name) else []
+        for purpose in (*(["allow"] if event.is_issued else read), "step"):
             methods[purpose, event.name] = members.name(f"{purpose}_{event.name.replace('.', '_')}")
     for item in model.communications:
         if EventKind.REQUEST in EVENT_KINDS[item.kind]:
-            for purpose in ("provide", "requirements", "conjuncts"):
+            purposes = ["provide"] if model.provides_for(item.name) else []
+            purposes += ["requirements", "conjuncts"] if model.requirements_on(item.name) else []
+            for purpose in purposes:
                 methods[purpose, item.name] = members.name(f"{purpose}_{item.name}")
         if item.when is not None:
             methods["matches", item.name] = members.name(f"matches_{item.name}")

@@ -36,9 +36,6 @@ _DATA, _SKIPPED, _FOUND = variable("data"), variable("skipped"), variable("found
 def read_method(writer: Writer, event: str) -> list[str]:
     """The method that converts what came with an uncontrollable event."""
     name, paths = writer.layout.methods["read", event], converted_paths(writer.model, event)
-    if not paths:
-        words = f"{event}: nothing of its data is converted."
-        return method(name, words, [Return(variable("NO_DATA"))], [_DATA])
     reader = Reader(writer.layout, _event_type(writer, event), writer.used, is_event=True)
     codes = [reader.read(path) for path in paths]
     # Arrays can be long, so they are not logged.
@@ -89,13 +86,15 @@ def _event_type(writer: Writer, event: str) -> Type:
     return type_
 
 
-def step_method(writer: Writer, event: str) -> list[str]:
-    """The method that takes an event; it returns the skipped updates, or None if it cannot happen now."""
-    step = _StepWriter(writer, event)
-    lines = step.method()
-    if step.may_skip:
-        writer.skipping.add(event)
-    return lines
+def step_method(writer: Writer, event: str, is_alone: bool) -> list[str]:
+    """The method that takes an event; it returns the skipped updates, or None if it cannot happen now.
+
+    Args:
+        writer: The writer.
+        event: The event.
+        is_alone: True if a message on the identifier of the event stands for nothing else.
+    """
+    return _StepWriter(writer, event).method(is_alone)
 
 
 class _StepWriter(StepWriter):
@@ -114,8 +113,8 @@ class _StepWriter(StepWriter):
         executable, namer = writer.layout.executable.events[event], PythonNamer(("self", "skipped"))
         super().__init__(executable, writer.scope, values, writer.scope, namer)
 
-    def method(self) -> list[str]:
-        """The whole method."""
+    def method(self, is_alone: bool) -> list[str]:
+        """The whole method; a message without data that stands for nothing else is handed to it."""
         for path in self.paths:
             name = self._namer.name("_".join(["value", *map(str, path)]))
             type_ = self._values.received_type(path)
@@ -126,8 +125,13 @@ class _StepWriter(StepWriter):
         skipped = [Let(_SKIPPED, constant(()))] if self.may_skip else []
         result = Return(_SKIPPED if self.may_skip else constant(()))
         body = [*self._refusals(), *self._plant(), *copied, *skipped, *body, result]
-        name = self.writer.layout.methods["step", self.event]
-        return method(name, f"Take {self.event}.", body, [*self.received.values()])
+        name, parameters = self.writer.layout.methods["step", self.event], [*self.received.values()]
+        if self.may_skip:
+            self.writer.skipping.add(self.event)
+        elif is_alone and not self.paths:
+            self.writer.whole.add(self.event)
+            parameters = [variable("data=None")]
+        return method(name, f"Take {self.event}.", body, parameters)
 
     def _copy_what_is_overwritten(self) -> None:
         """Find attributes that are read after a place that may write them; a superset is fine."""

@@ -25,6 +25,7 @@ class Writer:
         conditions: Writer of conditions over the state.
         marks: For each attribute what notes another value of it, once that is known.
         skipping: Events whose step may skip an update, so far.
+        whole: Events whose step does all that a message on their identifier stands for, so far.
     """
 
     layout: Layout
@@ -34,6 +35,7 @@ class Writer:
     conditions: PythonConditions = field(init=False)
     marks: dict[str, list[Statement]] = field(default_factory=dict)
     skipping: set[str] = field(default_factory=set)
+    whole: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self.scope = Scope(self.used.add, self.model, self._variable, self._location)

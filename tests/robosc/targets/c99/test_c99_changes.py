@@ -10,6 +10,7 @@ from robosc.execution.runtime.runner import Status
 from robosc.execution.runtime.settings import Settings
 from robosc.supervisor import Supervisor
 from robosc.targets import generate
+from robosc.targets.code.c.expressions import code_text
 from robosc.targets.code.c.layout import make_layout
 from robosc.targets.code.c.readers import Readers
 from support.c99 import GCC, SANITIZERS, WARNINGS, Reference, built, compare, compiled, microseconds
@@ -33,7 +34,7 @@ _PART = """
 """
 
 PARTS = 260
-"""With two requests and a silent step each: the turns of requests fill several words of words."""
+"""With two requests and a silent step each: the turns of requests fill many words."""
 
 
 def _ring(parts: int) -> Supervisor:
@@ -125,9 +126,10 @@ _SPEAKER = """
 """
 
 
-def test_turns_go_round_as_the_words_say(tmp_path: Path) -> None:
-    """The turns are numbered anew several times, while requests come and go."""
-    parts, decisions = 40, 400
+@pytest.mark.parametrize("parts", [12, 40], ids=["small", "large"])
+def test_turns_go_round_as_the_words_say(parts: int, tmp_path: Path) -> None:
+    """The turns of a large robot are numbered anew several times, while requests come and go."""
+    decisions = 400
     supervisor = unsupervised(f"robot Many {{{''.join(_SPEAKER.format(number) for number in range(parts))}}}")
     prefix = make_layout(supervisor).prefix
     cases = "\n".join(f"        case {n}: {prefix}_receive_flip{n}(&r, 0); break;" for n in range(parts))
@@ -204,9 +206,9 @@ int main(void)
 """
 
 
-@pytest.mark.parametrize("parts", [1, 8, 40, 600])
+@pytest.mark.parametrize("parts", [1, 8, 40, 600, 2100])
 def test_sets_are_as_flags(parts: int, tmp_path: Path) -> None:
-    """Sets of one word, of several words, and of several words of words."""
+    """Sets of one word, of several words, of wide words, and of several words of words."""
     supervisor = unsupervised(f"robot Many {{{''.join(_SPEAKER.format(number) for number in range(parts))}}}")
     prefix = make_layout(supervisor).prefix
     for path, text in generate(supervisor, "c99").items():
@@ -222,17 +224,22 @@ def test_sets_are_as_flags(parts: int, tmp_path: Path) -> None:
 
 def test_the_readers_of_a_place_are_those_that_read_it() -> None:
     read = [{"s->a"}, {"node_1"}, {"s->b", "s->a"}, set[str]()]
-    readers = Readers(read, {"node_1": {"node_2"}, "node_2": {"s->c"}})
-    first, again, of_c, of_nothing = (readers.of(place) for place in ("s->a", "s->a", "s->c", "s->d"))
-    assert first == again == 0
-    assert (of_c, of_nothing) == (3, 5)
+    readers = Readers(False, read, {"node_1": {"node_2"}, "node_2": {"s->c"}})
+    found = [code_text(readers.noted(place)) for place in ("s->a", "s->a", "s->c", "s->d")]
+    assert found == ["changed(r, 0)", "changed(r, 0)", "changed(r, 3)", "changed(r, 5)"]
     table = [line.strip() for line in readers.lines()]
     assert table[-4:] == ["2, 0, 2, /* 0: a */", "1, 1, /* 3: c */", "0, /* 5: d */", "};"]
+
+
+def test_the_readers_of_a_place_in_a_small_robot_are_bits() -> None:
+    readers = Readers(True, [{"s->a"}, {"s->b"}, {"s->a"}], {})
+    assert code_text(readers.noted("s->a")) == "changed(r, UINT32_C(0x5))"
+    assert readers.lines() == []
 
 
 def test_what_is_read_by_everything_has_no_entry() -> None:
     """The table of a model in which all depends on all does not grow with the square of its size."""
     everywhere = {f"s->at_{number}" for number in range(400)}
-    readers = Readers([everywhere] * 400, {})
-    assert {readers.of(place) for place in everywhere} == {None}
+    readers = Readers(False, [everywhere] * 400, {})
+    assert {code_text(readers.noted(place)) for place in everywhere} == {"all_changed(r)"}
     assert readers.lines() == []

@@ -156,6 +156,7 @@ def test_any_sequence_behaves_as_the_reference(everything: Path, seed: int) -> N
 
 
 @needs_gcc
+@pytest.mark.usefixtures("size")
 def test_random_supervisors_behave_as_the_reference(tmp_path: Path) -> None:
     """Fixed seeds, since each costs a compiler run."""
     seen: Counter[str] = Counter()

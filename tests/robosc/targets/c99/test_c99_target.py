@@ -52,6 +52,7 @@ def test_an_example_behaves_as_the_reference(name: str, tmp_path: Path) -> None:
 
 
 @needs_gcc
+@pytest.mark.usefixtures("size")
 def test_random_supervisors_behave_as_the_reference(tmp_path: Path) -> None:
     """Fixed seeds, since each costs a compiler run; what they meet shows that the comparison is worth something."""
     seen: Counter[str] = Counter()
@@ -152,6 +153,7 @@ robot Everything {
 
 
 @needs_gcc
+@pytest.mark.usefixtures("size")
 def test_requests_of_every_kind_behave_as_the_reference(tmp_path: Path) -> None:
     supervisor = unsupervised(EVERYTHING)
     seen = Counter(_kinds(compare(supervisor, compiled(supervisor, tmp_path), Random(7), 60, 150)))

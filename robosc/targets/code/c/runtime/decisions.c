@@ -116,20 +116,20 @@ static bool issue(robot_t *r, int request, bool *is_issued)
 /* Issue what the policy chooses among some candidates, or the next if its data is unknown or does not fit. */
 static bool issue_one_of(robot_t *r, robot_set_t *among, bool *is_issued)
 {
-    int turn = choose(r, among);
+    int member = choose(r, among);
     *is_issued = false;
-    while (turn != NOBODY) {
-        if (!issue(r, r->owners[turn], is_issued)) {
+    while (member != NOBODY) {
+        if (!issue(r, request_with(r, member), is_issued)) {
             return false;
         }
         if (*is_issued) {
-            remember_issued(r, turn);
+            remember_issued(r, member);
             return true;
         }
-        remove_from(among, turn);
-        remove_from(&r->candidates, turn);
-        add_to(&r->withheld, turn);
-        turn = choose(r, among);
+        remove_from(among, member);
+        remove_from(&r->candidates, member);
+        add_to(&r->withheld, member);
+        member = choose(r, among);
     }
     return true;
 }
@@ -151,13 +151,13 @@ static void find_candidates(robot_t *r)
     for (int number = first_in(&r->stale); number >= 0; number = next_in(&r->stale, number)) {
         const int request = number - ROBOT_SILENT_COUNT;
         if (request >= 0) {
-            const int turn = r->turns[request];
+            const int member = member_of(r, request);
             remove_from(&r->stale, number);
             if (!may_be_issued(r, request)) {
-                remove_from(&r->candidates, turn);
-            } else if (!is_in(&r->candidates, turn)) {
-                add_to(&r->candidates, turn);
-                add_to(&r->fresh, turn);
+                remove_from(&r->candidates, member);
+            } else if (!is_in(&r->candidates, member)) {
+                add_to(&r->candidates, member);
+                add_to(&r->fresh, member);
             }
         }
     }
@@ -172,8 +172,8 @@ static void find_ending(const robot_t *r, robot_set_t *ending)
         if (r->acting[topic].is_waiting) {
             const int sender = r->acting[topic].request;
             for (int request = REQUESTS[sender].next; request != sender; request = REQUESTS[request].next) {
-                if (is_in(&r->candidates, r->turns[request])) {
-                    add_to(ending, r->turns[request]);
+                if (is_in(&r->candidates, member_of(r, request))) {
+                    add_to(ending, member_of(r, request));
                 }
             }
         }

@@ -243,11 +243,24 @@ typedef struct {
 
 #endif
 #if ROBOT_SET_COUNT > 0
-/* Set of numbers: the bit of each, and of each word of these that is not zero. */
+#if ROBOT_IS_SMALL
+/* Set of numbers below 32: a bit for each. */
+typedef uint32_t robot_set_t;
+#else
+/* Set of numbers: the bit of each, and of each word of these that is not zero. Large sets have wide words, so that few
+   of these are gone through. */
+#if ROBOT_SET_COUNT > 1024
+typedef uint64_t robot_word_t;
+enum { ROBOT_WORD_BITS = 64 };
+#else
+typedef uint32_t robot_word_t;
+enum { ROBOT_WORD_BITS = 32 };
+#endif
 typedef struct {
-    uint32_t used[(ROBOT_SET_COUNT + 1023) / 1024];
-    uint32_t bits[(ROBOT_SET_COUNT + 31) / 32];
+    robot_word_t used[(ROBOT_SET_COUNT / ROBOT_WORD_BITS + ROBOT_WORD_BITS) / ROBOT_WORD_BITS];
+    robot_word_t bits[ROBOT_SET_COUNT / ROBOT_WORD_BITS + 1];
 } robot_set_t;
+#endif
 
 #endif
 typedef struct {
@@ -345,13 +358,18 @@ typedef struct {
 #if ROBOT_REQUEST_COUNT > 0
     int64_t decision;
     int64_t favoured[ROBOT_REQUEST_COUNT]; /* the decision at which a request was last issued for being new */
+#if ROBOT_IS_SMALL
+    int64_t turns[ROBOT_REQUEST_COUNT];    /* by request: the one with the least goes first */
+    robot_set_t candidates; /* requests that may be issued */
+#else
     int32_t turns[ROBOT_REQUEST_COUNT];    /* by request: the one with the least goes first */
     int32_t owners[2 * ROBOT_REQUEST_COUNT]; /* the request that has each turn, or -1 */
     int next_turn;
     int listed_count;       /* number of requests in the list of the policy `priority`, which have the first turns */
     robot_set_t candidates; /* turns of the requests that may be issued */
+#endif
     robot_set_t fresh;      /* those of them that could not be at the last decision */
-    robot_set_t withheld;   /* turns of requests that turned out at this decision to have no data, or unfit */
+    robot_set_t withheld;   /* those that turned out at this decision to have no data, or unfit */
     robot_set_t unchanging; /* requests that were issued in this stable state and changed nothing */
 #endif
 #else

@@ -1,13 +1,43 @@
 #if ROBOT_REQUEST_COUNT > 0
+#if ROBOT_IS_SMALL
+/* Policies. Each request has a turn, a number; among several, the one with the least goes first. It is the number of the
+   decision at which the request was issued last. Sets of candidates have the numbers of requests. */
+
+enum { NOBODY = -1 };
+
+static int member_of(const robot_t *r, int request)
+{
+    (void)r;
+    return request;
+}
+
+static int request_with(const robot_t *r, int member)
+{
+    (void)r;
+    return member;
+}
+
+#else
 /* Policies. Each request has a turn, a number; among several, the one with the least goes first. A request that was
    issued gets the next turn after all others. So the one that goes first is found at once, and there is nothing to be
-   sorted; the turns are numbered anew when they are used up. */
+   sorted; the turns are numbered anew when they are used up. Sets of candidates have the turns of requests. */
 
 enum {
     TURN_COUNT = 2 * ROBOT_REQUEST_COUNT,
     NOBODY = -1 /* instead of a request, or of a turn's owner */
 };
 
+static int member_of(const robot_t *r, int request)
+{
+    return r->turns[request];
+}
+
+static int request_with(const robot_t *r, int member)
+{
+    return r->owners[member];
+}
+
+#endif
 /* The request of a communication. */
 static int request_of(robot_communication_t communication)
 {
@@ -18,6 +48,32 @@ static int request_of(robot_communication_t communication)
     return request;
 }
 
+#if ROBOT_IS_SMALL
+/* In the beginning the list of the policy `priority` comes first, and then all others in source order. */
+static void new_policy(robot_t *r)
+{
+    const int listed_count = r->settings.policy == ROBOT_POLICY_PRIORITY ? r->settings.priority_count : 0;
+    r->decision = 0;
+    r->random = r->settings.seed;
+    empty(&r->candidates);
+    empty(&r->fresh);
+    empty(&r->withheld);
+    empty(&r->unchanging);
+    for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
+        r->turns[request] = request - ROBOT_REQUEST_COUNT;
+        r->favoured[request] = -ROBOT_REQUEST_COUNT;
+    }
+    for (int place = listed_count - 1; place >= 0; place--) {
+        r->turns[request_of(r->settings.priority[place])] = place - 2 * ROBOT_REQUEST_COUNT;
+    }
+}
+
+static bool is_listed(const robot_t *r, int request)
+{
+    return r->turns[request] < -ROBOT_REQUEST_COUNT;
+}
+
+#else
 /* A request gets the next turn after all others. */
 static void give_turn(robot_t *r, int request)
 {
@@ -72,6 +128,7 @@ static void renumber_turns(robot_t *r)
     }
 }
 
+#endif
 /* The splitmix64 generator (Steele, Lea and Flood, OOPSLA 2014). */
 static int next_random(robot_t *r, int count)
 {
@@ -86,25 +143,46 @@ static int next_random(robot_t *r, int count)
 static int choose_random(robot_t *r, const robot_set_t *among)
 {
     int left = 0;
-    for (int word = 0; word < SET_WORDS; word++) {
-        for (uint32_t bits = among->bits[word]; bits != 0; bits &= bits - 1) {
-            left++;
-        }
+    for (int turn = first_in(among); turn >= 0; turn = next_in(among, turn)) {
+        left++;
     }
     if (left > 0) {
-        left = next_random(r, left);
-        for (int word = 0; word < SET_WORDS; word++) {
-            for (uint32_t bits = among->bits[word]; bits != 0; bits &= bits - 1) {
-                if (left == 0) {
-                    return 32 * word + lowest_bit(bits);
-                }
-                left--;
-            }
+        int turn = first_in(among);
+        for (left = next_random(r, left); left > 0; left--) {
+            turn = next_in(among, turn);
         }
+        return turn;
     }
     return NOBODY;
 }
 
+#if ROBOT_IS_SMALL
+/* The one of some requests whose turn comes first, or NOBODY. */
+static int first_of(const robot_t *r, robot_set_t among)
+{
+    int first = first_in(&among);
+    for (int request = first; request >= 0; request = next_in(&among, request)) {
+        first = r->turns[request] < r->turns[first] ? request : first;
+    }
+    return first;
+}
+
+/* The one of some requests that goes first, or NOBODY. Newly enabled requests are preferred, each at most once in as many
+   decisions as there are requests; but those of the list go before. */
+static int choose_turn(robot_t *r, const robot_set_t *among)
+{
+    const int best = first_of(r, *among);
+    robot_set_t new = r->fresh & *among;
+    for (int request = first_in(&new); request >= 0; request = next_in(&new, request)) {
+        if (r->favoured[request] > r->decision - ROBOT_REQUEST_COUNT) {
+            remove_from(&new, request);
+        }
+    }
+    r->is_new = new != 0 && !is_listed(r, best);
+    return r->is_new ? first_of(r, new) : best;
+}
+
+#else
 /* The turn that comes first among some, or NOBODY. Newly enabled requests are preferred, each at most once in as many
    decisions as there are requests; but those of the list go before. */
 static int choose_turn(robot_t *r, const robot_set_t *among)
@@ -123,12 +201,33 @@ static int choose_turn(robot_t *r, const robot_set_t *among)
     return best;
 }
 
-/* One of the turns of some candidates, or NOBODY where there is none. */
+#endif
+/* One of some candidates, or NOBODY where there is none. */
 static int choose(robot_t *r, const robot_set_t *among)
 {
     return r->settings.policy == ROBOT_POLICY_RANDOM ? choose_random(r, among) : choose_turn(r, among);
 }
 
+#if ROBOT_IS_SMALL
+/* A request was issued. It is a candidate until it turns out that it is none any longer. */
+static void remember_issued(robot_t *r, int request)
+{
+    if (!is_listed(r, request)) {
+        if (r->is_new) {
+            r->favoured[request] = r->decision;
+        }
+        r->turns[request] = r->decision;
+    }
+}
+
+static void end_decision(robot_t *r)
+{
+    r->candidates |= r->withheld;
+    empty(&r->withheld);
+    empty(&r->fresh);
+    r->decision++;
+}
+#else
 /* The request with a turn was issued. It is a candidate until it turns out that it is none any longer. */
 static void remember_issued(robot_t *r, int turn)
 {
@@ -156,4 +255,5 @@ static void end_decision(robot_t *r)
         renumber_turns(r);
     }
 }
+#endif
 #endif

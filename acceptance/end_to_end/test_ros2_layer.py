@@ -60,7 +60,7 @@ def test_what_the_existing_controller_cannot_be_connected_with_is_told(porter: P
         "/supervised/power: another node uses it as std_srvs/srv/Trigger, this node as std_srvs/srv/SetBool",
         "/supervised/scan: /test_peer takes and this node sends in vain: deadline unlimited is sent, of 0.5 s is taken",
     ):
-        porter.until(lambda text=text: text in _messages(reports), text)
+        porter.until(lambda text=text: text in _messages(reports), text)  # type: ignore[misc]
         assert text in porter.layer.stderr, "on the console, too"
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from robosc.targets import GeneratedFiles, write_files
 
-# As `ros2 launch` starts a file of a package.
+# Starts a file of a package as `ros2 launch` does.
 RUNNER = """
 import os, sys
 from ament_index_python.packages import get_package_share_directory

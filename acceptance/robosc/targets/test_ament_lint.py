@@ -91,7 +91,6 @@ def test_every_package_of_an_example_passes_its_own_tests_with_linters(name: str
     for kind, files in example_packages(name).items():
         if any(path.startswith("test/test_") and path.endswith(".py") for path in files):
             write_files(files, tmp_path / kind)
-            # What the wheels of Jazzy have, and what they have not.
             expected = ("test_flake8", "test_pep257") if kind.startswith("ros2") else ()
             done = own_tests(tmp_path / kind, ("-m", "pytest", "-v", "-p", "no:cacheprovider", "test"), python)
             assert done.returncode == 0, done.stdout

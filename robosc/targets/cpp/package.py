@@ -23,6 +23,7 @@ from robosc.targets.cpp.naming import require_namespace, require_package_name
 from robosc.targets.cpp.recording import PERIOD_S, record
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.registry import GenerateOptions, StateMessage
+from robosc.targets.ros.distributions import fits
 from robosc.targets.ros.layer import Renamed, remapped_names, require_names_of_a_layer, require_own_topics
 from robosc.targets.ros.notices import is_known, with_notices
 from robosc.targets.ros.package import chosen, error_context, packages, release_identifiers, require_own_names
@@ -189,6 +190,7 @@ def _context(
         **_recorded(supervisor, unit, middleware),
         **_layered(found, asked, options, middleware),
         "deployment": str(supervisor.deployment),
+        "distributions": fits(supervisor.model, supervisor.deployment),
         "is_layer": layout.is_layer,
         "node_class": "LayerNode" if layout.is_layer else "ControllerNode",
         "numbers": _numbers(layout, found, asked, middleware) if layout.is_layer else [],

@@ -62,7 +62,9 @@ def test_a_sender_of_another_type_is_not_heard() -> None:
 @pytest.mark.parametrize("policy", ["reliable", "latched"])
 @pytest.mark.parametrize("sends", [True, False])
 def test_less_than_what_is_wanted_does_not_do(policy: str, sends: bool) -> None:
-    much, little = quality(**{policy: True}), quality(**{policy: False})
+    much, little = (
+        quality(reliable=is_much) if policy == "reliable" else quality(latched=is_much) for is_much in (True, False)
+    )
     for other, own, fits in (
         (much, much, True),
         (little, little, True),

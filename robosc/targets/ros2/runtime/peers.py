@@ -92,7 +92,7 @@ def _why_not(sender: Any, receiver: Any) -> str:
     ):
         if (getattr(sender, policy).name, getattr(receiver, policy).name) == (offered, wanted):
             return f'{policy} {offered.lower()} is sent, {wanted.lower()} is taken'
-    # Nobody asserts by hand that a publisher of the model lives, or promises when it sends again.
+    # No node asserts by hand that a publisher of the model lives, or promises when it sends again.
     if receiver.liveliness.name == 'MANUAL_BY_TOPIC' != sender.liveliness.name:
         return 'liveliness automatic is sent, manual_by_topic is taken'
     for policy in ('deadline', 'liveliness_lease_duration'):

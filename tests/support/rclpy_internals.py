@@ -37,7 +37,7 @@ def spun(*nodes: Any, until: Callable[[], bool]) -> None:
 def _service_change_state() -> None:
     """A lifecycle node has the service of its transitions there, whose `callback` may be replaced."""
 
-    class Managed(LifecycleNode):
+    class Managed(LifecycleNode):  # type: ignore[misc]  # it has no types everywhere
         def __init__(self) -> None:
             super().__init__("managed")
             self.asked: list[Any] = []
@@ -114,7 +114,7 @@ def notify_execute() -> None:
     """An action server has a function end a goal with it, and calls it itself without one as a goal begins."""
     begun, handles = list[Any](), list[Any]()
 
-    class Server(ActionServer):  # type: ignore[type-arg,misc]  # as nodes have it
+    class Server(ActionServer):  # type: ignore[misc]  # as nodes have it
         def notify_execute(self, goal_handle: Any, execute_callback: Any) -> None:
             begun.append(execute_callback)
             if execute_callback is not None:

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <functional>
 #include <future>
 #include <initializer_list>
@@ -22,6 +23,7 @@
 #include "rcl_interfaces/msg/parameter_descriptor.hpp"
 #include "rcl_interfaces/msg/set_parameters_result.hpp"
 #include "rosidl_runtime_cpp/traits.hpp"
+#include "rmw/types.h"
 #include "stand_in.hpp"
 
 #define RCLCPP_STAND_IN_LOG(level, logger, ...)                                                                        \
@@ -38,6 +40,13 @@
     } while (0)
 #define RCLCPP_WARN(logger, ...) RCLCPP_STAND_IN_LOG("WARN", logger, __VA_ARGS__)
 #define RCLCPP_ERROR(logger, ...) RCLCPP_STAND_IN_LOG("ERROR", logger, __VA_ARGS__)
+
+// The middleware of the variable that chooses one; none of them is there.
+extern "C" inline const char* rmw_get_implementation_identifier(void)
+{
+    const char* const chosen = std::getenv("RMW_IMPLEMENTATION");
+    return chosen != nullptr ? chosen : "rmw_fastrtps_cpp";
+}
 
 namespace rclcpp {
 
@@ -354,10 +363,6 @@ public:
 }  // namespace rclcpp
 
 // Of rcl and rmw, what clients are made with.
-struct rmw_request_id_t {
-    int64_t sequence_number;
-};
-
 struct rcl_client_options_t {
     int qos;
 };

@@ -19,7 +19,7 @@ class Distribution(msgspec.Struct, frozen=True):
         version: 1 for ROS 1, 2 for ROS 2.
         file: File of its definitions, as far as they differ from those of `base`.
         python: Version of its Python.
-        tests: What RoboSC's tests do with nodes in Python on it, in words.
+        tests: Trials of nodes in Python on it, in words.
         is_tested: True if nodes in Python run on its own client library in the tests.
         has_stamped_velocities: True if its robots take TwistStamped, and Nav2 sends it, unless they are told otherwise.
         base: Distribution that it is compared with, or None.

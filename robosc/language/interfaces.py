@@ -50,7 +50,7 @@ def interface_folders(distribution: str = "") -> tuple[Path, ...]:
     folders = [*(prefix / "share" for prefix in sourced), *_paths("ROS_PACKAGE_PATH")]
     if distribution and distribution != os.environ.get("ROS_DISTRO"):
         folders = [folder for folder in folders if not (folder / _CORE).is_dir()]
-    # Of packages that stand beside this Python, nobody knows the distribution.
+    # The distribution of packages that stand beside this Python is not known.
     own = Path(sys.prefix) / "share"
     if not distribution or not (own / _CORE).is_dir():
         folders.append(own)

@@ -129,7 +129,7 @@ class InterfaceChecker:
         meant = meant if self._chosen is None else [self._chosen, *meant]
         self._catalogues = tuple(Catalogue(distribution, found) for distribution in meant)
         self._checkers = _checkers(self._catalogues, types)
-        # What was found of packages that distributions have is of the chosen one.
+        # Definitions that were found of packages that distributions have are of the chosen one.
         foreign = found.without(shipped_types())
         others = [item for item in DISTRIBUTIONS if item not in meant]
         self._others = _checkers([Catalogue(distribution, foreign) for distribution in others], types)

@@ -39,8 +39,8 @@ def _send() -> None:
 
 
 if __name__ == "__main__":
-    rclpy.publisher.Publisher.publish = _publish_late  # type: ignore[method-assign]
-    rclpy.publisher.Publisher.wait_for_all_acked = lambda publisher, timeout=None: True  # type: ignore[method-assign]
+    rclpy.publisher.Publisher.publish = _publish_late
+    rclpy.publisher.Publisher.wait_for_all_acked = lambda publisher, timeout=None: True
     rclpy.utilities.get_rmw_implementation_identifier = lambda: IDENTIFIER
     threading.Thread(target=_send, daemon=True).start()
     del sys.argv[0]

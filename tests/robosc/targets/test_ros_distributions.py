@@ -1,5 +1,7 @@
 """Distributions that packages say they fit: the checks of the model are the twin."""
 
+from pathlib import Path
+
 import pytest
 from msgspec.structs import replace
 
@@ -72,7 +74,7 @@ def test_the_check_of_a_model_of_the_corpus_finds_the_same(case: str) -> None:
     for distribution, texts in fits(model, Deployment.CONTROLLER):
         found = check(replace(bundle, distribution=distribution.codename)).diagnostics
         named = {item.message for item in found if f"of {distribution.title} has no" in item.message}
-        # What only nodes of some kind can do has nothing to do with the distribution.
+        # Limits of one kind of nodes have nothing to do with the distribution.
         assert {text for text in named if "; it fits ROS 2" in text} == set() or texts, (distribution.codename, named)
         assert not texts or named, (distribution.codename, texts)
 
@@ -82,3 +84,9 @@ def test_the_page_of_a_package_has_the_table() -> None:
         page = generate(supervisor_of(model_of(TEXTS["pose"]), Deployment.CONTROLLER), target)["README.md"]
         assert "| Jazzy | yes |\n| Kilted | yes |\n| Lyrical | no: no geometry_msgs/Pose2D |\n" in page
         assert page.count("## Distributions") == 1
+
+
+def test_the_documentation_has_the_same_list() -> None:
+    text = (Path(__file__).parents[3] / "docs" / "generating.md").read_text(encoding="utf-8")
+    rows = [f"| {item.title} | {item.python} | {item.tests} |\n" for item in DISTRIBUTIONS]
+    assert all(row in text for row in rows)

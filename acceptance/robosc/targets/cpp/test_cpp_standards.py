@@ -40,7 +40,7 @@ robot Camera {
 }
 """
 
-# What Lyrical has for a field of the type uint8[]: it has elements, and is converted to no vector.
+# Stands for the class that Lyrical has for a field of the type uint8[]: it has elements, and is converted to no vector.
 BUFFER = """#pragma once
 #include <cstddef>
 #include <cstdint>

@@ -77,6 +77,8 @@ class Bundle(msgspec.Struct, frozen=True):
             they were found, with all that they are made of, and the types of a package that lacks one, named like
             `std_msgs/types.txt`; they are checked against but are no part of the model.
         aliases: Other names of files, such as that of a link, with the name that the file has here.
+        distribution: ROS distribution against whose interfaces the files are checked, e.g. `jazzy`; empty: none was
+            chosen, so that whatever fits one of them is right, and what does not fit Jazzy is noted.
     """
 
     main: SourceFile
@@ -84,6 +86,7 @@ class Bundle(msgspec.Struct, frozen=True):
     searched: tuple[str, ...] = ()
     interfaces: tuple[SourceFile, ...] = ()
     aliases: tuple[tuple[str, str], ...] = ()
+    distribution: str = ""
 
     @property
     def files(self) -> tuple[SourceFile, ...]:

@@ -25,7 +25,7 @@ from support.porter_ros1 import (
     porter_supervisor,
 )
 from support.process import Process
-from support.ros1 import PYTHON, missing, until
+from support.ros1 import PYTHON, Peer, missing, until
 from support.waiting import wait_until
 
 pytestmark = [
@@ -83,6 +83,17 @@ def require_that_a_careless_controller_is_supervised(porter: Porter) -> None:
     porter.blocks("/cmd_vel", 30)
     assert porter.speed == 0.0
     assert len(porter.commands) == stood
+
+
+def test_an_existing_controller_of_another_type_is_worth_a_warning(porter: Porter, tmp_path: Path) -> None:
+    porter.start("_server_wait:=0.0")
+    text = "/supervised/cmd_vel: /drive sends geometry_msgs/TwistStamped, this node takes geometry_msgs/Twist"
+    with Peer(porter.master, tmp_path, "drive") as other:
+        other.advertise("/supervised/cmd_vel", "geometry_msgs/TwistStamped")
+        layer = porter.layer
+        assert layer is not None
+        porter.until(lambda: text in layer.stderr, "a warning")
+    porter.end()
 
 
 def received(output: str) -> list[Any]:

@@ -38,6 +38,36 @@ def porter(workspace: Path, tmp_path: Path) -> Iterator[Porter]:
         yield made
 
 
+# Connections that cannot exist.
+
+
+def test_what_the_existing_controller_cannot_be_connected_with_is_told(porter: Porter) -> None:
+    from diagnostic_msgs.msg import DiagnosticArray
+    from geometry_msgs.msg import TwistStamped
+    from rclpy.duration import Duration
+    from rclpy.qos import QoSProfile
+    from sensor_msgs.msg import LaserScan
+    from std_srvs.srv import Trigger
+
+    reports = porter.peer.receive(DiagnosticArray, "/diagnostics")
+    porter.peer.publisher(TwistStamped, "/supervised/cmd_vel")
+    porter.peer.node.create_client(Trigger, "/supervised/power")
+    late = QoSProfile(depth=1, deadline=Duration(seconds=0.5))
+    porter.peer.node.create_subscription(LaserScan, "/supervised/scan", lambda message: None, late)
+    porter.start("server_wait:=0.0")
+    for text in (
+        "/supervised/cmd_vel: /test_peer sends geometry_msgs/msg/TwistStamped, this node takes geometry_msgs/msg/Twist",
+        "/supervised/power: another node uses it as std_srvs/srv/Trigger, this node as std_srvs/srv/SetBool",
+        "/supervised/scan: /test_peer takes and this node sends in vain: deadline unlimited is sent, of 0.5 s is taken",
+    ):
+        porter.until(lambda text=text: text in _messages(reports), text)  # type: ignore[misc]
+        assert text in porter.layer.stderr, "on the console, too"
+
+
+def _messages(reports: list[Any]) -> str:
+    return "; ".join(status.message for report in reports for status in report.status)
+
+
 # Messages.
 
 

@@ -344,6 +344,7 @@ def _playground(arguments: argparse.Namespace, scene: Any) -> "tuple[Callable[[]
     words = ["--deployment", arguments.deployment or "controller", "--engine", arguments.engine, "--allow-livelock"]
     words += [word for folder in arguments.library_path for word in ("--library-path", str(folder))]
     words += [word for folder in arguments.interface_path for word in ("--interface-path", str(folder))]
+    words += [] if arguments.distribution is None else ["--distribution", arguments.distribution]
     words += ["--reorder"] if arguments.reorder else []
     words += [] if arguments.max_nodes is None else ["--max-nodes", str(arguments.max_nodes)]
     watched = _watched_automata(arguments) if is_automata(arguments.model) else _watched(arguments, words)
@@ -391,7 +392,12 @@ def _watched(arguments: argparse.Namespace, words: list[str]) -> "WatchedModel":
     if text is None:
         bundle = read_bundle(arguments)
     else:
-        bundle = load(text=text, library_paths=arguments.library_path, interface_paths=arguments.interface_path)
+        bundle = load(
+            text=text,
+            library_paths=arguments.library_path,
+            interface_paths=arguments.interface_path,
+            distribution=arguments.distribution,
+        )
     deployment = arguments.deployment or "controller"
     outcome = synth.make(
         argparse.Namespace(**{**vars(arguments), "deployment": deployment}), bundle, allow_livelock=True

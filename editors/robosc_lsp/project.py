@@ -17,7 +17,7 @@ from robosc.errors import Diagnostic, LanguageError, Severity
 from robosc.interfaces import shipped_types
 from robosc.language import load_bundle, parse, read_source, syntax
 from robosc.language.bundle import SUFFIX, declared_libraries
-from robosc.language.interfaces import INTERFACE_KINDS, interface_folders
+from robosc.language.interfaces import INTERFACE_KINDS, interface_folders, sourced_distribution
 from robosc.language.parser import Parsed
 from robosc.model.check import Checked, Inspected, inspect
 from robosc.source import Bundle, Location, SourceFile
@@ -75,7 +75,8 @@ class Project:
         self.encoding = encoding
         self.folders = list(folders)
         self.library_paths: tuple[Path, ...] = ()
-        self.interface_paths = interface_folders()
+        self.distribution = sourced_distribution()
+        self.interface_paths = interface_folders(self.distribution)
         self._open: dict[str, Text] = {}
         self._by_path: dict[str, str] = {}
         self._known: dict[str, Analysis] = {}
@@ -117,6 +118,7 @@ class Project:
         """Return the project after some edits of existing files, which must not overlap."""
         changed = Project(self.encoding, self.folders)
         changed.library_paths, changed.interface_paths = self.library_paths, self.interface_paths
+        changed.distribution = self.distribution
         changed._open = dict(self._open)
         changed._find_paths()
         for uri, edits in changes.items():
@@ -223,16 +225,16 @@ class Project:
         path = _path(uri)
         if path is None:
             main = SourceFile(uri.rpartition("/")[2] or "untitled", text.text)
-            return Bundle(main), {main.name: uri}, ()
+            return Bundle(main, distribution=self.distribution), {main.name: uri}, ()
         unsaved = {real: self._open[other].text for real, other in self._by_path.items()}
         if uri in self._open:
             unsaved[os.path.realpath(path)] = text.text
         try:
-            bundle = load_bundle(path, self.library_paths, self.interface_paths, unsaved)
+            bundle = load_bundle(path, self.library_paths, self.interface_paths, unsaved, self.distribution)
         except LanguageError as error:
             return None, {}, error.diagnostics
         except OSError:
-            return Bundle(SourceFile(path.name, text.text)), {path.name: uri}, ()
+            return Bundle(SourceFile(path.name, text.text), distribution=self.distribution), {path.name: uri}, ()
         folder = Path(os.path.realpath(path)).parent
         uris = {file.name: self._uri(folder / file.name) for file in bundle.libraries}
         return bundle, {**uris, bundle.main.name: uri}, ()

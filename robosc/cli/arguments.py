@@ -70,7 +70,22 @@ def add_model_arguments(
         help="another folder with ROS packages whose .msg, .srv and .action files the model is checked against (may be "
         "repeated; always searched: an installed ROS, packages around the model, and common ones of RoboSC itself)",
     )
+    add_distribution_argument(parser)
     parser.add_argument("--json", action="store_true", help=json_help)
+
+
+def add_distribution_argument(
+    parser: argparse.ArgumentParser, help_: str = "ROS distribution against whose interfaces the model is checked"
+) -> None:
+    """Add the option for a ROS distribution."""
+    from robosc.interfaces import CODENAMES
+
+    parser.add_argument(
+        "--distribution",
+        choices=CODENAMES,
+        metavar="NAME",
+        help=f"{help_}: {', '.join(CODENAMES)} (default: the sourced one, else jazzy)",
+    )
 
 
 def add_deployment_argument(parser: argparse.ArgumentParser) -> None:
@@ -105,6 +120,7 @@ def add_given_supervisor_options(parser: argparse.ArgumentParser, stands: str) -
             metavar="DIR",
             help=f"another folder with {what} of the model, as for 'robosc synth' (may be repeated)",
         )
+    add_distribution_argument(parser)
     add_engine_options(parser)
 
 
@@ -220,6 +236,11 @@ def read_bundle(arguments: argparse.Namespace) -> Bundle:
     from robosc.pipeline.loading import read_model
 
     try:
-        return read_model(arguments.model, arguments.library_path, arguments.interface_path)
+        return read_model(
+            arguments.model,
+            arguments.library_path,
+            arguments.interface_path,
+            distribution=getattr(arguments, "distribution", None),
+        )
     except FileAccessError as error:
         raise UsageError(str(error)) from error

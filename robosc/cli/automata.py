@@ -372,6 +372,7 @@ def loaded(arguments: argparse.Namespace, text: str | None = None) -> "LoadedAut
 
     refuse(bool(arguments.library_path), "-L: automata import no libraries, and CIF models files by their places")
     refuse(bool(arguments.interface_path), "-I: automata have no types of ROS")
+    refuse(getattr(arguments, "distribution", None) is not None, "--distribution: automata have no types of ROS")
     deployment = getattr(arguments, "deployment", None)
     refuse(deployment == str(Deployment.LAYER), "--deployment: automata are not a node of a robot")
     if text is not None:

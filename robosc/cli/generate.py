@@ -240,11 +240,30 @@ def _refuse_options_of_others(arguments: argparse.Namespace) -> None:
     for option, value in about_packages.items():
         if value is not None and target != ALL and not target.startswith("ros"):
             raise UsageError(f"{option} is for ROS packages, and --target {target} makes none: leave it out")
+    _choose_distribution(arguments)
     if arguments.state_message not in (None, "json") and target not in (ALL, *_WITH_TYPED_STATE):
         raise UsageError(
             f"--state-message {arguments.state_message} is for --target {' and '.join(_WITH_TYPED_STATE)}: of "
             f"{target}, no node publishes a typed state; leave it out"
         )
+
+
+def _choose_distribution(arguments: argparse.Namespace) -> None:
+    """Refuse a distribution of the other ROS than the target's; one that was only sourced is left aside."""
+    from robosc.interfaces import distribution_of
+    from robosc.language.interfaces import sourced_distribution
+
+    target = arguments.target
+    version = next((number for number in (1, 2) if target.startswith(f"ros{number}")), None)
+    found = distribution_of(sourced_distribution() if arguments.distribution is None else arguments.distribution)
+    if version is None or found is None or found.version == version:
+        return
+    if arguments.distribution is not None:
+        raise UsageError(
+            f"--distribution {found.codename} is of ROS {found.version}, and --target {target} makes a package for ROS "
+            f"{version}: leave it out"
+        )
+    arguments.distribution = ""
 
 
 def _metadata(arguments: argparse.Namespace, found: "PackageMetadata") -> "PackageMetadata":

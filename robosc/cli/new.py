@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-from robosc.cli.arguments import given_path
+from robosc.cli.arguments import add_distribution_argument, given_path
 from robosc.cli.output import ExitCode, UsageError, print_json
 
 
@@ -28,10 +28,11 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     )
     parser.add_argument(
         "--stamped",
-        action="store_true",
-        help="send velocities as geometry_msgs/TwistStamped and not as Twist, as a TurtleBot3 takes them from ROS 2 "
-        "Jazzy on",
+        action=argparse.BooleanOptionalAction,
+        help="send velocities as geometry_msgs/TwistStamped, or as Twist (default: as the distribution's robots take "
+        "them: stamped from ROS 2 Kilted on; a TurtleBot3 on Jazzy takes TwistStamped, too)",
     )
+    add_distribution_argument(parser, "ROS distribution of the robot, which decides how velocities are sent")
     parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
     parser.set_defaults(run=run)
 
@@ -41,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     from robosc.starter import InvalidNameError, make_starter
 
     try:
-        starter = make_starter(arguments.robot, is_stamped=arguments.stamped)
+        starter = make_starter(arguments.robot, is_stamped=_is_stamped(arguments))
     except InvalidNameError as error:
         raise UsageError(str(error)) from error
     folder: Path = arguments.folder if arguments.folder is not None else Path(starter.stem)
@@ -53,6 +54,16 @@ def run(arguments: argparse.Namespace) -> int:
         sys.stdout.write("".join(f"{path}\n" for path in written))
         sys.stdout.write("\nNext:\n" + "".join(f"  {command}\n" for command in commands))
     return ExitCode.OK
+
+
+def _is_stamped(arguments: argparse.Namespace) -> bool:
+    from robosc.interfaces import distribution_of
+    from robosc.language.interfaces import sourced_distribution
+
+    if arguments.stamped is not None:
+        return bool(arguments.stamped)
+    distribution = distribution_of(arguments.distribution or sourced_distribution())
+    return distribution is not None and distribution.has_stamped_velocities
 
 
 def _next_commands(model: Path, folder: Path) -> list[str]:

@@ -1,7 +1,7 @@
 """Examination of a machine: what RoboSC needs there for a purpose, what is missing, and how to get it.
 
 It reads files and starts programs with a time limit; it opens no serial line, starts no ROS node, and needs no package
-beyond Python's own library.
+beyond those that every command needs.
 """
 
 from robosc.doctor.checks import Finding, Grade, Purpose, examine, is_ready

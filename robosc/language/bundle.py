@@ -24,6 +24,7 @@ def load_bundle(
     library_paths: Sequence[Path] = (),
     interface_paths: Sequence[Path] = (),
     unsaved: Mapping[str, str] = MappingProxyType({}),
+    distribution: str = "",
 ) -> Bundle:
     """Read a model and the libraries that it needs.
 
@@ -37,6 +38,7 @@ def load_bundle(
         library_paths: More folders to look in.
         interface_paths: Folders with ROS packages whose definitions of middleware types are looked up.
         unsaved: Texts that an editor has of files, by their real path; they are taken instead of what is saved.
+        distribution: ROS distribution against whose interfaces they are checked; empty: none is chosen.
 
     Raises:
         LanguageError: The model, or a library that it needs, is too large or not UTF-8.
@@ -69,6 +71,7 @@ def load_bundle(
         libraries=libraries,
         interfaces=find_interfaces((file.text for file in (main, *libraries)), packages),
         searched=tuple(_relative_name(folder, model) for folder in folders),
+        distribution=distribution,
     )
 
 

@@ -8,7 +8,13 @@ import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from robosc.interfaces import INTERFACE_KINDS, MalformedDefinitionError, nested_types, parse_definition
+from robosc.interfaces import (
+    INTERFACE_KINDS,
+    MalformedDefinitionError,
+    distribution_of,
+    nested_types,
+    parse_definition,
+)
 from robosc.interfaces.catalogue import INDEX
 from robosc.language.tokens import Kind, tokenize
 from robosc.source import SourceFile
@@ -24,10 +30,30 @@ _GENERATED = ("idl",)
 """Endings of definitions that are not read, but show that a type exists."""
 
 
-def interface_folders() -> tuple[Path, ...]:
-    """Folders that hold a folder for each ROS package, as the environment of an installed ROS names them."""
-    prefixes = [*_paths("AMENT_PREFIX_PATH"), *_paths("CMAKE_PREFIX_PATH"), Path(sys.prefix)]
-    folders = [*(prefix / "share" for prefix in prefixes), *_paths("ROS_PACKAGE_PATH")]
+_CORE = "std_msgs"
+"""Package that only the folders of a distribution itself have."""
+
+
+def sourced_distribution() -> str:
+    """The distribution of an installed ROS that was sourced; empty: none, or one that RoboSC does not know."""
+    codename = os.environ.get("ROS_DISTRO", "")
+    return codename if distribution_of(codename) is not None else ""
+
+
+def interface_folders(distribution: str = "") -> tuple[Path, ...]:
+    """Folders that hold a folder for each ROS package, as the environment of an installed ROS names them.
+
+    Args:
+        distribution: Distribution that is meant: folders of another one are left out. Empty: whatever is there.
+    """
+    sourced = [*_paths("AMENT_PREFIX_PATH"), *_paths("CMAKE_PREFIX_PATH")]
+    folders = [*(prefix / "share" for prefix in sourced), *_paths("ROS_PACKAGE_PATH")]
+    if distribution and distribution != os.environ.get("ROS_DISTRO"):
+        folders = [folder for folder in folders if not (folder / _CORE).is_dir()]
+    # The distribution of packages that stand beside this Python is not known.
+    own = Path(sys.prefix) / "share"
+    if not distribution or not (own / _CORE).is_dir():
+        folders.append(own)
     return tuple(dict.fromkeys(folder for folder in folders if folder.is_dir()))
 
 
@@ -135,4 +161,4 @@ def _read(path: Path) -> str | None:
         return None
 
 
-__all__ = ["INTERFACE_KINDS", "find_interfaces", "interface_folders", "nearby_folders"]
+__all__ = ["INTERFACE_KINDS", "find_interfaces", "interface_folders", "nearby_folders", "sourced_distribution"]

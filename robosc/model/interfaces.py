@@ -12,7 +12,16 @@ import msgspec
 from msgspec.structs import replace
 
 from robosc.expressions import Type
-from robosc.interfaces import DISTRIBUTIONS, INTERFACE_KINDS, Field, Part
+from robosc.interfaces import (
+    DISTRIBUTIONS,
+    INTERFACE_KINDS,
+    Distribution,
+    Field,
+    Part,
+    distribution_of,
+    shipped_types,
+    titles_of,
+)
 from robosc.interfaces.catalogue import Catalogue, FoundInterfaces
 from robosc.language import syntax
 from robosc.language.words import spelled
@@ -114,12 +123,16 @@ class InterfaceChecker:
     def __init__(self, bundle: Bundle, types: Types, findings: Findings, uses: PropertyUses) -> None:
         found = FoundInterfaces({file.name: file.text for file in bundle.interfaces})
         self._are_searched = bool(bundle.searched)
-        self._catalogues = tuple(Catalogue(distribution, found) for distribution in DISTRIBUTIONS)
-        self._checkers = {
-            (catalogue.distribution, language): FieldChecker(catalogue, language, types)
-            for catalogue in self._catalogues
-            for language in Language
-        }
+        self._chosen = distribution_of(bundle.distribution)
+        meant = [item for item in DISTRIBUTIONS if self._chosen is None or item.version != self._chosen.version]
+        # Findings speak of the chosen one.
+        meant = meant if self._chosen is None else [self._chosen, *meant]
+        self._catalogues = tuple(Catalogue(distribution, found) for distribution in meant)
+        self._checkers = _checkers(self._catalogues, types)
+        # Definitions that were found of packages that distributions have are of the chosen one.
+        foreign = found.without(shipped_types())
+        others = [item for item in DISTRIBUTIONS if item not in meant]
+        self._others = _checkers([Catalogue(distribution, foreign) for distribution in others], types)
         self._types = types
         self._findings = findings
         self._noted: set[str] = set()
@@ -152,11 +165,11 @@ class InterfaceChecker:
 
     def _checked(self, item: _Linked) -> Catalogue | None:
         """Report what does not fit; the first catalogue in which something fits."""
+        each = self._outcomes(item, self._checkers)
         outcomes: dict[tuple[int, Language], _Outcome] = {}
-        for (distribution, language), checker in self._checkers.items():
+        for (distribution, language), found in each.items():
             key = (distribution.version, language)
-            found = _outcome(item, checker, self._uses.of(item.communication.name))
-            if found is not None and (key not in outcomes or len(found.faults) < len(outcomes[key].faults)):
+            if key not in outcomes or len(found.faults) < len(outcomes[key].faults):
                 outcomes[key] = found
         for outcome in tuple(outcomes.values())[:1]:
             for data, part in parts_by_event(item.communication, outcome.catalogue).values():
@@ -165,6 +178,8 @@ class InterfaceChecker:
             self._note_missing(item.package, f"{item.package}/{item.type}", item.interface.package.location)
             return None
         outcomes = self._without_needless(item, outcomes)
+        if self._chosen is not None and self._report_of_chosen(item, outcomes, self._chosen.version):
+            return None
         fitting = next((outcome for outcome in outcomes.values() if not outcome.faults), None)
         if fitting is None:
             # Faults are reported against the version that fits best.
@@ -179,7 +194,45 @@ class InterfaceChecker:
             for version in (1, 2)
         )
         self._report_limits(ros1, ros2)
+        if self._chosen is None:
+            self._note_others(item, each, fitting.catalogue.distribution)
         return fitting.catalogue
+
+    def _outcomes(
+        self, item: _Linked, checkers: Mapping[tuple[Distribution, Language], FieldChecker]
+    ) -> dict[tuple[Distribution, Language], _Outcome]:
+        """Outcomes of the distributions that know the interface."""
+        used = self._uses.of(item.communication.name)
+        found = {key: _outcome(item, checker, used) for key, checker in checkers.items()}
+        return {key: outcome for key, outcome in found.items() if outcome is not None}
+
+    def _report_of_chosen(self, item: _Linked, outcomes: Mapping[tuple[int, Language], _Outcome], version: int) -> bool:
+        """Report what the chosen distribution lacks and others of its version have; True if there is something."""
+        own = [outcome for (other, _), outcome in outcomes.items() if other == version]
+        if not own or not all(outcome.faults for outcome in own):
+            return False
+        needless = self.left_out.get(item.communication.name, LeftOut())
+        fitting = _fitting(self._outcomes(item, self._others), version, needless)
+        for fault in own[0].faults if fitting else ():
+            fix = f"Use what {own[0].catalogue.distribution.title} has, or choose another one with --distribution."
+            text = f"{fault.message}; it fits {titles_of(fitting)}"
+            self._report_once(replace(fault, message=text, hint="", name="", fix=fix))
+        return bool(fitting)
+
+    def _note_others(
+        self, item: _Linked, each: Mapping[tuple[Distribution, Language], _Outcome], fits: Distribution
+    ) -> None:
+        """Note what does not fit the distribution that is taken where none is chosen."""
+        first = next(distribution for distribution in DISTRIBUTIONS if distribution.version == fits.version)
+        needless = self.left_out.get(item.communication.name, LeftOut())
+        found = [_essential(outcome, needless) for (other, _), outcome in each.items() if other is first]
+        if fits is first or not found or not all(found):
+            return
+        fitting = _fitting(each, fits.version, needless)
+        for fault in found[0]:
+            text = f"{fault.message}; it fits {titles_of(fitting)}"
+            fix = "Nothing needs fixing if the robot runs that: choose the distribution with --distribution."
+            self._report_once(replace(fault, code="other-distribution", message=text, hint="", name="", fix=fix))
 
     def _without_needless(
         self, item: _Linked, outcomes: dict[tuple[int, Language], _Outcome]
@@ -212,8 +265,8 @@ class InterfaceChecker:
             (fault.hint, fault.fix) if near is None else (f"; did you mean '{near}'?", f"Write '{spelled(near)}'.")
         )
         # Data that has no meaning is an error; what only ROS could not do is one for packages of ROS.
-        report = self._findings.error if fault.code == "ambiguous-field" else self._findings.warning
-        report(fault.code, fault.message + hint, fault.location, fix, *fault.related)
+        report = _REPORTS.get(fault.code, Findings.warning)
+        report(self._findings, fault.code, fault.message + hint, fault.location, fix, *fault.related)
 
     def _note_missing(self, package: str, type_: str, location: Location) -> None:
         if any(catalogue.knows(package) for catalogue in self._catalogues):
@@ -263,6 +316,35 @@ class InterfaceChecker:
             self._report_once(_unknown_type(interface, knowing[0], INTERFACE_KINDS))
         else:
             self._note_missing(package, f"{package}/{type_}", interface.package.location)
+
+
+_REPORTS = {"ambiguous-field": Findings.error, "other-distribution": Findings.note}
+
+
+def _checkers(catalogues: Iterable[Catalogue], types: Types) -> dict[tuple[Distribution, Language], FieldChecker]:
+    return {
+        (catalogue.distribution, language): FieldChecker(catalogue, language, types)
+        for catalogue in catalogues
+        for language in Language
+    }
+
+
+def _fitting(
+    outcomes: Mapping[tuple[Distribution, Language], _Outcome], version: int, needless: LeftOut
+) -> tuple[Distribution, ...]:
+    """The distributions of a version for which nodes in Python or in C++ can start."""
+    return tuple(
+        dict.fromkeys(
+            distribution
+            for (distribution, _), outcome in outcomes.items()
+            if distribution.version == version and not _essential(outcome, needless)
+        )
+    )
+
+
+def _essential(outcome: _Outcome, needless: LeftOut) -> tuple[Fault, ...]:
+    """The faults that are not about properties that nothing needs."""
+    return tuple(fault for fault in outcome.faults if fault.needless not in needless)
 
 
 def _outcome(item: _Linked, checker: FieldChecker, used: frozenset[str]) -> _Outcome | None:

@@ -65,6 +65,7 @@ def load(
     name: str = TEXT_NAME,
     library_paths: Sequence[FileName] = (),
     interface_paths: Sequence[FileName] = (),
+    distribution: str | None = None,
 ) -> LoadedModel:
     """Load a model, library or automata, with all imported files; `check` reports what is wrong with it.
 
@@ -79,8 +80,11 @@ def load(
         library_paths: More folders with libraries, as `-L` of the command line.
         interface_paths: Folders with ROS packages whose .msg, .srv and .action files the model is checked against, as
             `-I` of the command line; those of an installed ROS and around the model are always searched.
+        distribution: ROS distribution against whose interfaces the model is checked, as `--distribution` of the command
+            line; None: the one that was sourced, if any; empty: none is chosen.
 
     Raises:
+        ValueError: The distribution is unknown.
         TypeError: Neither a file nor a text is given, or both are; or libraries or ROS packages are given for automata.
         FileAccessError: A file or folder does not exist or cannot be read.
         LanguageError: A file is too large or not UTF-8.
@@ -90,9 +94,11 @@ def load(
     libraries, interfaces = ([given_path(item) for item in paths] for paths in (library_paths, interface_paths))
     file = given_path(name) if path is None else _model_path(path)
     if not is_automata(file):
-        return _loaded(read_model(file, libraries, interfaces, text))
-    if libraries or interfaces:
-        raise TypeError("library_paths and interface_paths are for RoboSC models: automata have no libraries or types")
+        return _loaded(read_model(file, libraries, interfaces, text, distribution))
+    if libraries or interfaces or distribution:
+        raise TypeError(
+            "library_paths, interface_paths and distribution are for RoboSC models: automata have no libraries or types"
+        )
     return _loaded(load_automata_file(file, text))
 
 
@@ -124,7 +130,11 @@ def loaded(model: ModelLike) -> LoadedModel:
 
 
 def read_model(
-    model: Path, library_paths: Sequence[Path], interface_paths: Sequence[Path], text: str | None = None
+    model: Path,
+    library_paths: Sequence[Path],
+    interface_paths: Sequence[Path],
+    text: str | None = None,
+    distribution: str | None = None,
 ) -> Bundle:
     """Read a model and its libraries, with the definitions of an installed ROS.
 
@@ -133,14 +143,22 @@ def read_model(
         library_paths: More folders with libraries.
         interface_paths: More folders with ROS packages.
         text: Text of the model; the file then need not exist.
+        distribution: ROS distribution against whose interfaces it is checked; None: the sourced one, if any; empty:
+            none is chosen.
 
     Raises:
+        ValueError: The distribution is unknown.
         FileAccessError: The file or a folder does not exist or cannot be read.
         LanguageError: A file is too large or not UTF-8.
     """
+    from robosc.interfaces import CODENAMES
     from robosc.language import decode_source, load_bundle
-    from robosc.language.interfaces import interface_folders
+    from robosc.language.interfaces import interface_folders, sourced_distribution
 
+    if distribution and distribution not in CODENAMES:
+        raise ValueError(f"there is no ROS distribution {distribution!r} here, but {', '.join(CODENAMES)}")
+    if distribution is None:
+        distribution = sourced_distribution()
     if is_automata(model):
         raise FileAccessError(
             f"{model} holds automata, which check, synth, explain-synthesis, explore, verify, simulate and generate "
@@ -160,7 +178,8 @@ def read_model(
         if text is not None:
             # Text that is not UTF-8 is refused, as in a file.
             unsaved[os.path.realpath(model)] = decode_source(text.encode("utf-8", "surrogatepass"), model.name)
-        return load_bundle(model, library_paths, (*interface_paths, *interface_folders()), unsaved)
+        folders = (*interface_paths, *interface_folders(distribution))
+        return load_bundle(model, library_paths, folders, unsaved, distribution)
     except FileAccessError:
         raise
     except OSError as error:
@@ -180,7 +199,7 @@ def _model_path(path: FileName) -> Path:
 
 def _loaded(bundle: Bundle) -> LoadedModel:
     kind = LoadedAutomata if is_automata(Path(bundle.main.name)) else LoadedModel
-    return kind(bundle.main, bundle.libraries, bundle.searched, bundle.interfaces)
+    return kind(bundle.main, bundle.libraries, bundle.searched, bundle.interfaces, distribution=bundle.distribution)
 
 
 def property_file(file: FileName | SourceFile) -> SourceFile:

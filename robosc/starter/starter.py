@@ -72,7 +72,7 @@ def make_starter(robot: str, *, is_stamped: bool = False) -> Starter:
 
     Args:
         robot: Its name.
-        is_stamped: True if velocities are sent as TwistStamped, as a TurtleBot3 takes them from Jazzy on.
+        is_stamped: True if velocities are sent as TwistStamped, as robots take them from Kilted on.
 
     Raises:
         InvalidNameError: The language has no such name, or it is too long for a file.

@@ -16,6 +16,7 @@ def test_every_field_of_every_request_says_what_was_meant() -> None:
         (SourceFile("../shared/a.rscd", ""),),
         ("here",),
         (SourceFile("std_msgs/msg/Bool.msg", "bool data"),),
+        distribution="kilted",
     )
     options = SynthesisOptions(
         deployment=Deployment.LAYER,
@@ -39,6 +40,7 @@ def test_every_field_of_every_request_says_what_was_meant() -> None:
         libraries=[pb.SourceFile(name="../shared/a.rscd")],
         searched=["here"],
         interfaces=[pb.SourceFile(name="std_msgs/msg/Bool.msg", text="bool data")],
+        distribution="kilted",
     )
     assert request_of(Check(bundle)) == pb.CheckRequest(bundle=sent)
     assert request_of(Synthesize(bundle, options)) == pb.SynthesizeRequest(bundle=sent, options=sent_options)

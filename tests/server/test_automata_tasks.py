@@ -128,6 +128,7 @@ class TestAcceptance:
     def test_files_of_robots_are_refused(self) -> None:
         others: dict[str, pb.Bundle] = {
             "searched": pb.Bundle(searched=["here"]),
+            "distribution": pb.Bundle(distribution="jazzy"),
             "interfaces": pb.Bundle(interfaces=[pb.SourceFile(name="a/msg/B.msg")]),
         }
         for name, other in others.items():

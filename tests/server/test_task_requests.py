@@ -73,6 +73,7 @@ class TestAcceptance:
             (pb.Bundle(main=pb.SourceFile(name="a"), libraries=[pb.SourceFile(name="b")] * 2), "two files"),
             (pb.Bundle(main=pb.SourceFile(name="a"), interfaces=[pb.SourceFile(name="b")] * 2), "two files"),
             (pb.Bundle(main=pb.SourceFile(name="a"), interfaces=[pb.SourceFile(name="/b")]), "relative"),
+            (pb.Bundle(main=pb.SourceFile(name="a"), distribution="rolling"), "no ROS distribution 'rolling'"),
         ],
     )
     @pytest.mark.parametrize("kind", [kind for kind in TaskKind if kind is not TaskKind.FORMAT])
@@ -424,6 +425,8 @@ class TestKeys:
             pb.Bundle(searched=["x", "y"]),
             pb.Bundle(searched=["y", "x"]),
             pb.Bundle(interfaces=library.libraries),
+            pb.Bundle(distribution="jazzy"),
+            pb.Bundle(distribution="lyrical"),
             library,
             pb.Bundle(libraries=[pb.SourceFile(name="a", text="y")]),
             pb.Bundle(libraries=[pb.SourceFile(name="b", text="x")]),

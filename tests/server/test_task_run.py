@@ -649,3 +649,15 @@ def test_definitions_of_ros_types_travel_with_a_bundle_and_common_ones_are_there
         bundle = pb.Bundle(main=main, interfaces=interfaces, searched=searched)
         (answer,) = answers(TaskKind.CHECK, pb.CheckRequest(bundle=bundle))
         assert [item.code for item in answer.diagnostics] == expected
+
+
+@pytest.mark.parametrize("distribution", ["", "jazzy", "lyrical"])
+def test_a_robot_is_checked_against_the_chosen_distribution(distribution: str) -> None:
+    text = """robot R {
+        interface pose use Pose2D from geometry_msgs
+        component C { outgoing message pose with identifier: "/pose", type: none links pose }
+    }"""
+    bundle = pb.Bundle(main=pb.SourceFile(name="robot.rscd", text=text), distribution=distribution)
+    (answer,) = answers(TaskKind.CHECK, pb.CheckRequest(bundle=bundle))
+    expected = ["unknown-ros-type"] if distribution == "lyrical" else []
+    assert [item.code for item in answer.diagnostics] == expected

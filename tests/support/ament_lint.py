@@ -4,18 +4,41 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+from robosc.certification import make_supervisor
 from robosc.model.structure import Deployment
 from robosc.targets import GeneratedFiles, GenerateOptions, generate
 from robosc.targets.registry import StateMessage
 from support.execution import supervisor_of
 from support.generated import example_supervisor
 from support.goal_porter import porter_supervisor
-from support.models import EXAMPLES, model_of
+from support.models import EXAMPLES, example_bundle, model_of
 
 LAYER = "line_follower/line_follower_layer"
 MAZE = "maze_solver/maze_solver"
 NAVIGATION = "navigation/navigation"
 COURIER = Path(__file__).parents[1] / "models" / "courier" / "model.rscd"
+
+EXAMPLE_ROBOTS = tuple(
+    sorted(
+        path.relative_to(EXAMPLES).with_suffix("").as_posix()
+        for path in EXAMPLES.rglob("*.rscd")
+        # A folder of libraries.
+        if path.parent.name != "shared"
+    )
+)
+"""The example robots, such as `maze_solver/maze_solver`."""
+
+
+def example_packages(name: str) -> dict[str, GeneratedFiles]:
+    """Every ROS package of an example robot, by target and deployment; some robots can have no layer."""
+    made = {item: make_supervisor(example_bundle(name), deployment=item).supervisor for item in Deployment}
+    assert made[Deployment.CONTROLLER] is not None, name
+    return {
+        f"{target}-{deployment}": generate(supervisor, target)
+        for deployment, supervisor in made.items()
+        if supervisor is not None
+        for target in ("ros1", "ros1-cpp", "ros2", "ros2-cpp")
+    }
 
 
 def long_names(target: str, deployment: Deployment) -> GeneratedFiles:

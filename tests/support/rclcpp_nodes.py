@@ -144,7 +144,12 @@ def hostile() -> Supervisor:
 
 
 def run(
-    program: Path, lines: Sequence[str], *parameters: str, namespace: str = "/", level: str = "warn"
+    program: Path,
+    lines: Sequence[str],
+    *parameters: str,
+    namespace: str = "/",
+    level: str = "warn",
+    middleware: str = "rmw_fastrtps_cpp",
 ) -> subprocess.CompletedProcess[str]:
     """Run a node on what happens to it, with parameters such as `period:=0.02`; the last line is to end it."""
     arguments = [word for parameter in parameters for word in ("-p", parameter)]
@@ -155,7 +160,7 @@ def run(
         capture_output=True,
         text=True,
         timeout=LIMIT_S,
-        env={"PATH": os.environ["PATH"]},
+        env={"PATH": os.environ["PATH"], "RMW_IMPLEMENTATION": middleware},
         check=False,
     )
 

@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 
 from robosc.targets import GenerateOptions, PackageMetadata, generate, write_files
-from support.ament_lint import MAZE, PACKAGES
+from support.ament_lint import EXAMPLE_ROBOTS, MAZE, PACKAGES, example_packages
 from support.colcon import colcon_program
 from support.generated import example_supervisor
+from support.own_tests import own_tests
 
 # A Python with ROS 2 hands these variables down to programs that have their own.
 HANDED_DOWN = ("LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE", "PYTHONPATH")
@@ -71,6 +72,30 @@ def test_a_linter_finds_nothing_in_a_generated_package(linter: str, name: str, t
         assert "File 'package.xml' is valid" in output
         launch = [str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.launch")]
         assert not launch or linted(linter, tmp_path, *launch).returncode == 0
+
+
+@pytest.mark.ros2
+@pytest.mark.parametrize("name", EXAMPLE_ROBOTS)
+def test_a_linter_finds_nothing_in_any_package_of_an_example(name: str, tmp_path: Path) -> None:
+    for kind, files in example_packages(name).items():
+        write_files(files, tmp_path / kind)
+    for linter in OF_JAZZY:
+        done = linted(linter, tmp_path)
+        assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.ros2
+@pytest.mark.parametrize("name", EXAMPLE_ROBOTS)
+def test_every_package_of_an_example_passes_its_own_tests_with_linters(name: str, tmp_path: Path) -> None:
+    python = str(colcon_program().parent / "bin" / "python")
+    for kind, files in example_packages(name).items():
+        if any(path.startswith("test/test_") and path.endswith(".py") for path in files):
+            write_files(files, tmp_path / kind)
+            expected = ("test_flake8", "test_pep257") if kind.startswith("ros2") else ()
+            done = own_tests(tmp_path / kind, ("-m", "pytest", "-v", "-p", "no:cacheprovider", "test"), python)
+            assert done.returncode == 0, done.stdout
+            for test in expected:
+                assert f"::{test} PASSED" in done.stdout
 
 
 @pytest.mark.ros2

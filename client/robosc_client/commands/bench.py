@@ -7,6 +7,8 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
+from msgspec.structs import replace
+
 from robosc.cli.arguments import add_model_arguments, read_bundle
 from robosc.cli.output import ExitCode, UsageError, print_json
 from robosc.source import Bundle, SourceFile
@@ -121,7 +123,7 @@ def _requests(arguments: argparse.Namespace, bundle: Bundle) -> Callable[[int], 
 def varied(bundle: Bundle, number: int) -> Bundle:
     """Return the same model with a unique comment."""
     text = f"{bundle.main.text}\n// {_RUN} {number}\n"
-    return Bundle(SourceFile(bundle.main.name, text), bundle.libraries, bundle.searched, bundle.interfaces)
+    return replace(bundle, main=SourceFile(bundle.main.name, text))
 
 
 def _report(arguments: argparse.Namespace, measured: Measured) -> None:

@@ -229,6 +229,7 @@ def _bundle(bundle: Bundle) -> pb.Bundle:
         searched=list(bundle.searched),
         interfaces=map(_file, bundle.interfaces),
         language=_LANGUAGES.get(PurePath(bundle.main.name).suffix),
+        distribution=bundle.distribution,
     )
 
 

@@ -94,18 +94,20 @@ class SourceFile(_message.Message):
     def __init__(self, name: _Optional[str] = ..., text: _Optional[str] = ...) -> None: ...
 
 class Bundle(_message.Message):
-    __slots__ = ("main", "libraries", "searched", "interfaces", "language")
+    __slots__ = ("main", "libraries", "searched", "interfaces", "language", "distribution")
     MAIN_FIELD_NUMBER: _ClassVar[int]
     LIBRARIES_FIELD_NUMBER: _ClassVar[int]
     SEARCHED_FIELD_NUMBER: _ClassVar[int]
     INTERFACES_FIELD_NUMBER: _ClassVar[int]
     LANGUAGE_FIELD_NUMBER: _ClassVar[int]
+    DISTRIBUTION_FIELD_NUMBER: _ClassVar[int]
     main: SourceFile
     libraries: _containers.RepeatedCompositeFieldContainer[SourceFile]
     searched: _containers.RepeatedScalarFieldContainer[str]
     interfaces: _containers.RepeatedCompositeFieldContainer[SourceFile]
     language: Language
-    def __init__(self, main: _Optional[_Union[SourceFile, _Mapping]] = ..., libraries: _Optional[_Iterable[_Union[SourceFile, _Mapping]]] = ..., searched: _Optional[_Iterable[str]] = ..., interfaces: _Optional[_Iterable[_Union[SourceFile, _Mapping]]] = ..., language: _Optional[_Union[Language, str]] = ...) -> None: ...
+    distribution: str
+    def __init__(self, main: _Optional[_Union[SourceFile, _Mapping]] = ..., libraries: _Optional[_Iterable[_Union[SourceFile, _Mapping]]] = ..., searched: _Optional[_Iterable[str]] = ..., interfaces: _Optional[_Iterable[_Union[SourceFile, _Mapping]]] = ..., language: _Optional[_Union[Language, str]] = ..., distribution: _Optional[str] = ...) -> None: ...
 
 class Location(_message.Message):
     __slots__ = ("file", "line", "column", "length")

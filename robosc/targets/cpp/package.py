@@ -23,6 +23,7 @@ from robosc.targets.cpp.naming import require_namespace, require_package_name
 from robosc.targets.cpp.recording import PERIOD_S, record
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.registry import GenerateOptions, StateMessage
+from robosc.targets.ros.distributions import fits
 from robosc.targets.ros.layer import Renamed, remapped_names, require_names_of_a_layer, require_own_topics
 from robosc.targets.ros.notices import is_known, with_notices
 from robosc.targets.ros.package import chosen, error_context, packages, release_identifiers, require_own_names
@@ -128,9 +129,9 @@ def _generate(supervisor: Supervisor, name: str, options: GenerateOptions, middl
             # Each package has a namespace of its own: two of them may be loaded into one process.
             text = runtime_text(unit.layout, path, module).replace("namespace robosc", f"namespace {name}")
             files[f"src/runtime/{path}"] = f"{top}\n{text}"
-    environment = _environment(middleware.module, middleware.python)
     context = _context(supervisor, unit, name, found, asked, options, middleware)
     for path, template in _templates(middleware, is_layer).items():
+        environment = _environment(middleware.module, middleware.python, in_python=path.endswith(".py"))
         files[path.format(package=name)] = environment.get_template(template).render(context)
     noticed = with_notices(files, options.metadata)
     return GeneratedFiles({path: folded(text) if path.endswith(".py") else text for path, text in noticed.items()})
@@ -189,6 +190,7 @@ def _context(
         **_recorded(supervisor, unit, middleware),
         **_layered(found, asked, options, middleware),
         "deployment": str(supervisor.deployment),
+        "distributions": fits(supervisor.model, supervisor.deployment),
         "is_layer": layout.is_layer,
         "node_class": "LayerNode" if layout.is_layer else "ControllerNode",
         "numbers": _numbers(layout, found, asked, middleware) if layout.is_layer else [],
@@ -329,10 +331,11 @@ def declaration(parameter: Parameter) -> str:
 
 
 @cache
-def _environment(module: str, python: str) -> jinja2.Environment:
+def _environment(module: str, python: str, *, in_python: bool) -> jinja2.Environment:
+    """Templates of a middleware's packages; literals are those of the language of the file."""
     filters: dict[str, Callable[..., object]] = {
         "declaration": declaration,
-        "literal": string_literal,
+        "literal": ascii if in_python else string_literal,
         "safe_comment": safe,
         "callers": partial(callers_name, ""),
         "robots": partial(robots_name, ""),

@@ -17,6 +17,7 @@ from robosc.targets.code.python.generate import header
 from robosc.targets.code.python.package import beside_supervisor, python_text
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.registry import GenerateOptions, StateMessage
+from robosc.targets.ros.distributions import fits
 from robosc.targets.ros.layer import (
     Renamed,
     remapped_names,
@@ -134,6 +135,7 @@ def generate_package(middleware: Middleware, supervisor: Supervisor, options: Ge
     values["not_in_file"] = middleware.not_in_file
     values["supervised"] = options.supervised
     values["is_known_license"] = is_known(options.metadata.license)
+    values["distributions"] = fits(supervisor.model, deployment)
     values["remapped"] = remapped_names(found, asked, middleware.remapped)
     files = _python_files(supervisor, name, middleware)
     get_template = _environment(middleware.package).get_template

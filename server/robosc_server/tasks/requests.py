@@ -17,6 +17,7 @@ from google.protobuf.message import DecodeError
 
 from robosc._version import __version__
 from robosc.dd_modules import has_cudd
+from robosc.interfaces import CODENAMES
 from robosc.source import visible
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.fields import Nested, has_few_fields, nested_of
@@ -250,7 +251,11 @@ class _RequestReader:
                 if name in names:
                     raise _malformed(f"two files of the bundle have the name '{name}'")
                 names.add(name)
-        return language, main, *others, [self.text(place) for place in searched]
+        if message.distribution and message.distribution not in CODENAMES:
+            raise _malformed(
+                f"there is no ROS distribution '{message.distribution[:80]}' here, but {', '.join(CODENAMES)}"
+            )
+        return language, main, *others, [self.text(place) for place in searched], message.distribution
 
     def _require_automata(self, message: Any, ending: str) -> None:
         """Do nothing if a bundle has what automata may have.
@@ -260,7 +265,9 @@ class _RequestReader:
         """
         if not self.main_file.endswith(ending):
             raise _malformed(f"a file of this language has a name that ends in {ending}, not '{self.main_file[-80:]}'")
-        self.refuse_of_robots(searched=message.searched, interfaces=message.interfaces)
+        self.refuse_of_robots(
+            searched=message.searched, interfaces=message.interfaces, distribution=message.distribution
+        )
         if message.libraries and ending != ".cif":
             raise _malformed("libraries: plain automata import no files")
 

@@ -113,3 +113,54 @@ def test_the_help_explains_changed_files(capsys: pytest.CaptureFixture[str], tmp
     help_text = " ".join(capsys.readouterr().out.partition("exit status:")[2].split())
     assert "1 nothing is written: " in help_text
     assert "files were changed since they were generated" in help_text
+
+
+POSE = """robot Pose {
+    interface pose use Pose2D from geometry_msgs
+    datatype object Pose { theta: double }
+    component C {
+        outgoing message pose with identifier: "/pose", type: Pose links pose
+        incoming message go with identifier: "/go", type: none
+        behaviour { variable theta: double = 0.0 on response from pose do theta := value.theta
+            initial marked state s { on request to go } }
+    }
+}
+"""
+
+
+def pose_words(tmp_path: Path, target: str) -> list[str]:
+    model = tmp_path / "pose.rscd"
+    model.write_text(POSE, encoding="utf-8")
+    words = ["generate", str(model), "--target", target, "-o", str(tmp_path / f"out_{target}")]
+    return [*words, "--maintainer", "Jane Doe <jane@example.org>"]
+
+
+@pytest.mark.parametrize(
+    ("distribution", "status"), [("jazzy", 0), ("kilted", 0), ("humble", 0), ("lyrical", 1), ("", 0), ("sourced", 1)]
+)
+def test_a_package_is_refused_for_a_distribution_that_lacks_something(
+    distribution: str, status: int, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_DISTRO", "lyrical" if distribution == "sourced" else "")
+    chosen = ["--distribution", distribution] if distribution not in ("", "sourced") else []
+    assert main([*pose_words(tmp_path, "ros2"), *chosen]) == status
+    captured = capsys.readouterr()
+    text = "geometry_msgs of ROS 2 Lyrical has no message 'Pose2D'; it fits ROS 2 Humble, Jazzy and Kilted"
+    assert (text in captured.out + captured.err) is (status == 1)
+
+
+def test_a_distribution_of_the_other_ros_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    for target, distribution in (("ros1", "jazzy"), ("ros2-cpp", "noetic")):
+        error = refused(capsys, main, *pose_words(tmp_path, target), "--distribution", distribution)
+        assert f"--distribution {distribution} is of ROS" in error
+    assert "rolling" in refused(capsys, main, *pose_words(tmp_path, "ros2"), "--distribution", "rolling")
+
+
+def test_a_sourced_distribution_of_the_other_ros_is_left_aside(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_DISTRO", "lyrical")
+    assert main(pose_words(tmp_path, "ros1")) == 0
+    monkeypatch.setenv("ROS_DISTRO", "noetic")
+    assert main(pose_words(tmp_path, "ros2")) == 0
+    capsys.readouterr()

@@ -53,6 +53,33 @@ def test_what_new_makes_passes_every_command(name: str, tmp_path: Path, capsys: 
     assert read_page(Path("page.md").read_text(encoding="utf-8"))[0].title == name
 
 
+@pytest.mark.parametrize(
+    ("words", "sourced", "is_stamped"),
+    [
+        ([], "", False),
+        ([], "jazzy", False),
+        ([], "kilted", True),
+        ([], "rolling", False),
+        (["--distribution", "lyrical"], "jazzy", True),
+        (["--distribution", "humble"], "kilted", False),
+        (["--stamped"], "jazzy", True),
+        (["--no-stamped", "--distribution", "lyrical"], "", False),
+    ],
+)
+def test_velocities_are_sent_as_the_robots_of_the_distribution_take_them(
+    words: list[str],
+    sourced: str,
+    is_stamped: bool,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setenv("ROS_DISTRO", sourced)
+    assert main(["new", "Rover", *words]) == 0
+    assert ("TwistStamped" in Path("rover/rover_parts.rscd").read_text(encoding="utf-8")) is is_stamped
+    capsys.readouterr()
+    assert main(["check", "--strict", "rover/rover.rscd"]) == 0
+
+
 @pytest.mark.parametrize("folder", ["my robot", "-o", "'quoted'"])
 def test_the_next_commands_are_ready_for_a_shell(folder: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["new", "Courier", f"--folder={folder}"]) == 0

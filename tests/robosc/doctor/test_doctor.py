@@ -57,6 +57,7 @@ class MadeUp(Machine):
         self.mine: set[str] = set()
         self.later: set[str] = set()
         self.modules = {"rclpy": "/usr/bin/python3", "rospy": "/usr/bin/python3"}
+        self.middleware = "rmw_fastrtps_cpp"
         self.answer: Output | None = Output(0, "SERVING\n")
         self.commands: list[Sequence[str]] = []
         self.is_installed = True
@@ -74,7 +75,7 @@ class MadeUp(Machine):
         self.commands.append(command)
         for module, python in self.modules.items():
             if f"import {module}" in command[2]:
-                return Output(0, "rmw_fastrtps_cpp\n") if command[0] == python else Output(1, "ModuleNotFoundError\n")
+                return Output(0, f"{self.middleware}\n") if command[0] == python else Output(1, "ModuleNotFoundError\n")
         return self.answer if "import r" not in command[2] else None
 
     def matching(self, folder: str, pattern: str) -> tuple[str, ...]:
@@ -179,9 +180,22 @@ def test_ros_that_is_not_sourced(machine: MadeUp) -> None:
     assert found["rclpy"].fix == "source /opt/ros/jazzy/setup.bash"
 
 
+@pytest.mark.parametrize("codename", ["jazzy", "kilted", "noetic"])
+def test_a_distribution_that_is_tested_is_fine(machine: MadeUp, codename: str) -> None:
+    version = "1" if codename == "noetic" else "2"
+    machine.environment = {"ROS_DISTRO": codename, "ROS_VERSION": version}
+    (found,) = (item for item in examine(machine, [Purpose(f"ros{version}")]) if item.part == f"ROS {version}")
+    assert (found.grade, found.message) == (Grade.OK, f"{codename} is sourced")
+
+
 def test_a_distribution_that_is_not_tested_is_reported(machine: MadeUp) -> None:
-    machine.environment = {"ROS_DISTRO": "humble", "ROS_VERSION": "2"}
-    assert "tested with jazzy" in problems(machine, Purpose.ROS2)["ROS 2"].message
+    for codename in ("humble", "lyrical", "rolling"):
+        machine.environment = {"ROS_DISTRO": codename, "ROS_VERSION": "2"}
+        message = problems(machine, Purpose.ROS2)["ROS 2"].message
+        assert message.startswith(f"{codename} is sourced; generated packages are tested with jazzy and kilted")
+        assert ("interfaces are not known" in message) is (codename == "rolling")
+    machine.environment = {"ROS_DISTRO": "melodic", "ROS_VERSION": "1"}
+    assert "tested with noetic" in problems(machine, Purpose.ROS1)["ROS 1"].message
     # ROS 1 is no distribution of ROS 2.
     machine.environment = {"ROS_DISTRO": "noetic", "ROS_VERSION": "1"}
     assert "no distribution is sourced" in problems(machine, Purpose.ROS2)["ROS 2"].message
@@ -190,6 +204,31 @@ def test_a_distribution_that_is_not_tested_is_reported(machine: MadeUp) -> None:
 def test_a_middleware_that_is_not_the_wanted_one(machine: MadeUp) -> None:
     machine.environment = {**machine.environment, "RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}
     assert "not rmw_cyclonedds_cpp" in problems(machine, Purpose.ROS2)["middleware"].message
+
+
+def test_zenoh_is_named_and_a_missing_router_is_reported(machine: MadeUp) -> None:
+    assert "Zenoh router" not in {item.part for item in examine(machine, [Purpose.ROS2])}
+    machine.middleware = "rmw_zenoh_cpp"
+    machine.answer = Output(1, "ConnectionRefusedError")
+    found = problems(machine, Purpose.ROS2)
+    assert found["middleware"].message.startswith("rmw_zenoh_cpp")
+    assert found["Zenoh router"].grade is Grade.MISSING
+    assert found["Zenoh router"].fix == "ros2 run rmw_zenoh_cpp rmw_zenohd"
+    assert ["localhost", "7447"] in [list(command[-2:]) for command in machine.commands]
+    assert problems(machine)["Zenoh router"].grade is Grade.NOTE
+    machine.answer = Output(0, "")
+    assert "Zenoh router" not in problems(machine, Purpose.ROS2)
+    machine.environment = {**machine.environment, "ZENOH_CONFIG_OVERRIDE": "mode=client"}
+    found = problems(machine, Purpose.ROS2)
+    assert (found["Zenoh router"].grade, "ZENOH_CONFIG_OVERRIDE" in found["Zenoh router"].message) == (Grade.NOTE, True)
+
+
+def test_zenoh_that_is_wanted_and_not_there_needs_its_router_too(machine: MadeUp) -> None:
+    machine.environment = {**machine.environment, "RMW_IMPLEMENTATION": "rmw_zenoh_cpp"}
+    machine.answer = None
+    found = problems(machine, Purpose.ROS2)
+    assert "not rmw_zenoh_cpp" in found["middleware"].message
+    assert found["Zenoh router"].grade is Grade.MISSING
 
 
 @pytest.mark.parametrize("python", ["/usr/bin/python3", "/venv/bin/python"])

@@ -13,7 +13,7 @@ from robosc.errors import Severity
 from robosc.interfaces import DISTRIBUTIONS, Field, Part
 from robosc.interfaces.catalogue import Catalogue, FoundInterfaces
 from robosc.language import load_bundle
-from robosc.language.interfaces import find_interfaces, interface_folders
+from robosc.language.interfaces import find_interfaces, interface_folders, sourced_distribution
 from robosc.model import message_fields
 from robosc.model.check import check
 from robosc.model.interfaces import headers_of as known_headers
@@ -282,6 +282,131 @@ def test_a_local_definition_wins_over_the_one_that_comes_with_robosc(
     files = (SourceFile("sensor_msgs/msg/BatteryState.msg", local),)
     found = check(Bundle(SourceFile("model.rscd", text), interfaces=files)).diagnostics
     assert [item.code for item in found] == codes, found
+
+
+# Distributions.
+
+POSE_2D = ("Pose2D from geometry_msgs", "theta: double")
+WAYPOINT = ("WaypointStatus from nav2_msgs", "error_msg: string")
+TRACKED = ("TrackingFeedback from nav2_msgs", "speed: double")
+
+
+def of_distribution(uses: tuple[str, str], distribution: str, *files: SourceFile) -> list[tuple[str, Severity, str]]:
+    name, _, package = uses[0].partition(" from ")
+    text = MODEL.format(name, package, uses[1], "")
+    bundle = Bundle(SourceFile("model.rscd", text), interfaces=files, distribution=distribution)
+    return [(item.code, item.severity, item.message) for item in check(bundle).diagnostics]
+
+
+@pytest.mark.parametrize(
+    ("uses", "distribution", "expected"),
+    [
+        (POSE_2D, "jazzy", None),
+        (
+            POSE_2D,
+            "lyrical",
+            "geometry_msgs of ROS 2 Lyrical has no message 'Pose2D'; it fits ROS 2 Humble, Jazzy and Kilted",
+        ),
+        (
+            WAYPOINT,
+            "jazzy",
+            "nav2_msgs of ROS 2 Jazzy has no message 'WaypointStatus'; it fits ROS 2 Kilted and Lyrical",
+        ),
+        (WAYPOINT, "kilted", None),
+        (TRACKED, "lyrical", None),
+        (TRACKED, "kilted", "nav2_msgs of ROS 2 Kilted has no message 'TrackingFeedback'; it fits ROS 2 Lyrical"),
+    ],
+)
+def test_what_the_chosen_distribution_lacks_is_a_warning_with_its_name(
+    uses: tuple[str, str], distribution: str, expected: str | None
+) -> None:
+    found = of_distribution(uses, distribution)
+    assert [item for item in found if item[0] not in ("ros2-only", "ros1-only")] == (
+        [] if expected is None else [("unknown-ros-type", Severity.WARNING, expected)]
+    )
+
+
+FIELD = """robot R {
+    interface navigate use NavigateToPose from nav2_msgs
+    datatype object Done { error_code: integer }
+    datatype object Far { position_tracking_error: double }
+    component C {
+        action go with request: none, response: RESPONSE, feedback: FEEDBACK, stamped: "map" links navigate
+        behaviour {
+            variable code: integer(0..9999)
+            variable offset: double
+            initial marked state idle { on request to go goto busy }
+            state busy {
+                UPDATE goto idle
+                on error from go goto idle
+                on cancel to go goto idle
+            }
+        }
+    }
+}"""
+RESULT = FIELD.replace("RESPONSE", "Done").replace("FEEDBACK", "none")
+RESULT = RESULT.replace("UPDATE", "on response from go do code := value.error_code")
+PROGRESS = FIELD.replace("RESPONSE", "none").replace("FEEDBACK", "Far")
+PROGRESS = PROGRESS.replace("UPDATE", "on feedback from go do offset := value.position_tracking_error")
+
+
+@pytest.mark.parametrize(
+    ("text", "lacking", "named"),
+    [
+        (RESULT, ["humble"], "it fits ROS 2 Jazzy, Kilted and Lyrical"),
+        (PROGRESS, ["humble", "jazzy", "kilted"], "it fits ROS 2 Lyrical"),
+    ],
+)
+def test_a_field_that_came_is_reported_with_the_distributions_that_have_it(
+    text: str, lacking: list[str], named: str
+) -> None:
+    for distribution in ("humble", "jazzy", "kilted", "lyrical"):
+        bundle = Bundle(SourceFile("model.rscd", text), distribution=distribution)
+        found = [item for item in check(bundle).diagnostics if item.code == "unknown-field"]
+        if distribution in lacking:
+            (item,) = found
+            assert f"nav2_msgs/NavigateToPose of ROS 2 {distribution.capitalize()} has no field" in item.message
+            assert item.message.endswith(f"; {named}")
+            assert item.severity is Severity.WARNING
+            assert "--distribution" in item.fix
+        else:
+            assert found == []
+
+
+def test_where_none_is_chosen_what_jazzy_lacks_is_noted() -> None:
+    message = "nav2_msgs of ROS 2 Jazzy has no message 'WaypointStatus'; it fits ROS 2 Kilted and Lyrical"
+    assert of_distribution(WAYPOINT, "") == [("other-distribution", Severity.NOTE, message)]
+    assert of_distribution(POSE_2D, "") == []
+
+
+def test_nothing_of_other_distributions_helps_where_none_fits() -> None:
+    found = of_distribution(("Pose2D from geometry_msgs", "thita: double"), "jazzy")
+    assert [item[0] for item in found] == ["needless-property"]
+    ((code, _, message),) = of_distribution(("Pose2 from geometry_msgs", "x: double"), "lyrical")
+    assert (code, message) == (
+        "unknown-ros-type",
+        "geometry_msgs of ROS 2 Lyrical has no message 'Pose2'; did you mean 'Pose'?",
+    )
+
+
+def test_what_is_installed_is_of_the_chosen_distribution() -> None:
+    file = SourceFile("geometry_msgs/msg/Pose2D.msg", "float64 other\nbuiltin_interfaces/Time stamp")
+    assert of_distribution(("Pose2D from geometry_msgs", "other: double"), "lyrical", file)[1:] == []
+
+
+def test_folders_of_another_distribution_are_not_searched(share: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    prefixes = share.parent / "jazzy", share.parent / "workspace"
+    for prefix, package in zip(prefixes, ("std_msgs", "robot_msgs"), strict=True):
+        (prefix / "share" / package).mkdir(parents=True)
+    monkeypatch.setenv("AMENT_PREFIX_PATH", ":".join(map(str, prefixes)))
+    monkeypatch.setenv("ROS_DISTRO", "jazzy")
+    jazzy, workspace = (prefix / "share" for prefix in prefixes)
+    assert interface_folders("jazzy")[:2] == (jazzy, workspace)
+    assert interface_folders("lyrical")[0] == workspace
+    assert jazzy not in interface_folders("lyrical")
+    assert sourced_distribution() == "jazzy"
+    monkeypatch.setenv("ROS_DISTRO", "rolling")
+    assert sourced_distribution() == ""
 
 
 # The twin: what a Python node of ROS 2 does with the classes of the installed ROS.

@@ -85,7 +85,7 @@ def test_what_is_of_robots_is_refused(tmp_path: Path) -> None:
             robosc.synthesize(model, options)
     with pytest.raises(TypeError, match="automata are verified by themselves"):
         robosc.verify(model, "invariant true")
-    with pytest.raises(TypeError, match="library_paths and interface_paths are for RoboSC models"):
+    with pytest.raises(TypeError, match="library_paths, interface_paths and distribution are for"):
         robosc.load(text=TANK, name="tank.cif", library_paths=[tmp_path])
     robot = robosc.load(text="robot R { component C { incoming message m with type: none } }")
     with pytest.raises(TypeError, match="a robot begins in one state"):

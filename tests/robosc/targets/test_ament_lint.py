@@ -11,35 +11,35 @@ from xml.etree import ElementTree
 
 import pytest
 
-from robosc.targets import GeneratedFiles, generate, write_files
-from support.ament_lint import MAZE, PACKAGES
+from robosc.targets import generate, write_files
+from support.ament_lint import EXAMPLE_ROBOTS, MAZE, PACKAGES, example_packages
 from support.generated import example_supervisor
-from support.models import EXAMPLES
 
 # Rules of ament_flake8 and ament_pep257 that ruff has, too; the linters themselves run in acceptance/.
 SELECTED = "A001,A002,C4,D,E,F,Q,W"
-EXAMPLE_MODELS = sorted(path.relative_to(EXAMPLES).with_suffix("").as_posix() for path in EXAMPLES.glob("*/*.rscd"))
 IGNORED = "D100,D101,D102,D103,D104,D105,D106,D107,D203,D212,D404"
 
 
 @pytest.mark.parametrize("name", PACKAGES)
 def test_nothing_is_found_in_a_generated_package(name: str, tmp_path: Path) -> None:
-    require_nothing_found(PACKAGES[name](), tmp_path)
+    write_files(PACKAGES[name](), tmp_path)
+    require_nothing_found(tmp_path)
 
 
-def require_nothing_found(files: GeneratedFiles, tmp_path: Path) -> None:
-    """Fail if the linters find anything in a package."""
-    write_files(files, tmp_path)
-    (tmp_path / "ruff.toml").write_text('lint.flake8-quotes.inline-quotes = "single"\nline-length = 99\n')
-    options = ["--config", str(tmp_path / "ruff.toml"), "--select", SELECTED, "--ignore", IGNORED]
+def require_nothing_found(folder: Path) -> None:
+    """Fail if the linters find anything in a folder."""
+    (folder / "ruff.toml").write_text('lint.flake8-quotes.inline-quotes = "single"\nline-length = 99\n')
+    options = ["--config", str(folder / "ruff.toml"), "--select", SELECTED, "--ignore", IGNORED]
     ruff = [sys.executable, "-m", "ruff", "check", "--no-cache", "--target-version", "py38", *options, "."]
-    done = subprocess.run(ruff, cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = subprocess.run(ruff, cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
 
 
-@pytest.mark.parametrize("name", EXAMPLE_MODELS)
-def test_nothing_is_found_in_the_package_of_an_example(name: str, tmp_path: Path) -> None:
-    require_nothing_found(generate(example_supervisor(name), "ros2"), tmp_path)
+@pytest.mark.parametrize("name", EXAMPLE_ROBOTS)
+def test_nothing_is_found_in_any_package_of_an_example(name: str, tmp_path: Path) -> None:
+    for kind, files in example_packages(name).items():
+        write_files(files, tmp_path / kind)
+    require_nothing_found(tmp_path)
 
 
 def colons_after_blanks(text: str) -> Iterator[int]:

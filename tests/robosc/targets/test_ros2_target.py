@@ -20,9 +20,12 @@ from robosc.targets.ros.runtime.parameters import USE_SIM_TIME, ParameterError, 
 from robosc.targets.ros.state_topic import state_topic
 from robosc.targets.ros2.runtime.lifecycle import AUTOSTART
 from robosc.targets.ros2.runtime.state import STATE_MESSAGE
+from support import rclpy_uses
+from support.ament_lint import PACKAGES
 from support.execution import unsupervised
 from support.generated import example_supervisor
 from support.launch_stub import launch_actions
+from support.rclpy_uses import INTERNAL, PRIVATE, private_uses
 
 yaml = pytest.importorskip("yaml", reason="PyYAML, a part of ROS 2, is not installed")
 
@@ -354,3 +357,28 @@ def test_every_transition_has_a_number_of_its_own() -> None:
     assert dict(tables.transitions["scan.response"])["LidarSensor"] == {
         state: by_place["LidarSensor", state, "response", "scan"] for state in ("unsafe", "safe")
     }
+
+
+# Uses of rclpy beside its documented interface.
+
+
+@pytest.mark.parametrize("name", ["ros2", "ros2-goals", "ros2-types", "ros2-layer"])
+def test_every_use_of_a_private_attribute_of_rclpy_is_known_and_tried(name: str) -> None:
+    files = PACKAGES[name]()
+    assert private_uses(files) <= set(PRIVATE)
+    trials = ast.parse(Path(rclpy_uses.__file__).with_name("rclpy_internals.py").read_text(encoding="utf-8"))
+    tried = {item.name for item in trials.body if isinstance(item, ast.FunctionDef)}
+    assert {*PRIVATE, *INTERNAL} <= tried
+
+
+def test_all_of_them_are_used() -> None:
+    texts = {
+        path: text for name in ("ros2-goals", "ros2-types", "ros2-layer") for path, text in PACKAGES[name]().items()
+    }
+    assert private_uses(texts) == set(PRIVATE)
+    assert all(any(name in text for text in texts.values()) for name in INTERNAL)
+
+
+def test_a_use_that_nobody_knows_is_noticed() -> None:
+    text = "class A(Node):\n    def f(self):\n        self._own = self._clock\n        return self._own\n"
+    assert private_uses({"a.py": text, "b.py": "getattr(x, '_timers', ())\n"}) == {"_clock", "_timers"}

@@ -134,7 +134,7 @@ class Node:
 
     def __getattr__(self, name: str) -> Any:
         nothing = dict.fromkeys(("publish", "warning", "info"), lambda message: None)
-        return lambda *arguments, **named: SimpleNamespace(**nothing)
+        return lambda *arguments, **named: SimpleNamespace(qos_profile=None, **nothing)
 
     def has_parameter(self, name: str) -> bool:
         return name in self._values

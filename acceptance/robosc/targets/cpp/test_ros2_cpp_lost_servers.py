@@ -119,7 +119,9 @@ def test_a_server_without_results_is_worth_a_warning(courier_node: Path, tmp_pat
 def test_others_of_another_type_or_quality_are_worth_a_warning(courier_node: Path) -> None:
     lines = [
         *SERVERS,
-        "shown /cmd_vel 1:base:geometry_msgs/msg/TwistStamped 2:log:geometry_msgs/msg/Twist",
+        "shown /cmd_vel 1:base:geometry_msgs/msg/TwistStamped 2:log:geometry_msgs/msg/Twist "
+        "5:late:geometry_msgs/msg/Twist:deadline 6:alive:geometry_msgs/msg/Twist:lease "
+        "7:hand:geometry_msgs/msg/Twist:manual",
         "shown /allowed 3:button:std_msgs/msg/Bool:best_effort 4:_NODE_NAME_UNKNOWN_:std_msgs/msg/Bool",
         "offered /power std_srvs/srv/SetBool",
         "offered /power std_srvs/srv/Trigger",
@@ -132,7 +134,12 @@ def test_others_of_another_type_or_quality_are_worth_a_warning(courier_node: Pat
     assert sorted(done.stderr.splitlines()) == [
         "[WARN] /allowed: /button sends and this node takes in vain: "
         "reliability best_effort is sent, reliable is taken",
+        "[WARN] /cmd_vel: /alive takes and this node sends in vain: "
+        "liveliness_lease_duration unlimited is sent, of 2 s is taken",
         "[WARN] /cmd_vel: /base takes geometry_msgs/msg/TwistStamped, this node sends geometry_msgs/msg/Twist",
+        "[WARN] /cmd_vel: /hand takes and this node sends in vain: "
+        "liveliness automatic is sent, manual_by_topic is taken",
+        "[WARN] /cmd_vel: /late takes and this node sends in vain: deadline unlimited is sent, of 0.5 s is taken",
         "[WARN] /count: another node uses it as test_msgs/action/NestedMessage_SendGoal, this node as "
         "test_msgs/action/Fibonacci_SendGoal",
         "[WARN] /power: another node uses it as std_srvs/srv/Trigger, this node as std_srvs/srv/SetBool",

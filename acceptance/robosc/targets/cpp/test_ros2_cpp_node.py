@@ -2,6 +2,7 @@
 
 import json
 import re
+import time
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -474,3 +475,11 @@ def test_simulated_time_may_stand_and_go_back(maze_node: Path, tmp_path: Path) -
     kinds = [(entry["kind"], entry.get("what")) for entry in entries_of(tmp_path) if entry["kind"] != "event"]
     assert ("stop", "time has gone back by 50.250 s") in kinds
     assert ("restart", "") in kinds
+
+
+def test_where_nothing_is_acknowledged_the_last_messages_get_time(maze_node: Path) -> None:
+    lines = ["wait publish /state", END]
+    began_s = time.monotonic()
+    done = run(maze_node, lines, "publish_state:=true", PATIENT, middleware="rmw_zenoh_cpp")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert time.monotonic() - began_s >= 0.3

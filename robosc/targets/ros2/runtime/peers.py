@@ -14,6 +14,45 @@ from typing import Any
 
 from robosc.targets.ros2.runtime.inquiry import node_of
 
+UNLIMITED_NS = 2**63 - 1
+"""Duration of what has no limit, as the middleware shows it; that of a node's own profile is 0."""
+
+
+class Ends:
+    """
+    The ends of topics that a node has.
+
+    :param node: The node.
+    """
+
+    def __init__(self, node: Any) -> None:
+        self._node = node
+        self._ends: list[tuple[str, str, bool, Any]] = []
+
+    def add(self, name: str, topic: Any, sends: bool, quality: Any) -> None:
+        """
+        Add an end.
+
+        :param name: The topic's name on ROS.
+        :param topic: The topic, with the package and the name of its type.
+        :param sends: True if the node sends there.
+        :param quality: The node's quality of service there, as it is once overrides are in it.
+        """
+        type_name = topic.package + '/msg/' + topic.type_name
+        self._ends.append((name, type_name, sends, quality))
+
+    def misfits(self) -> list[str]:
+        """Return what keeps other nodes from being connected with this one, in words."""
+        found = []
+        for name, type_name, sends, quality in self._ends:
+            look = (
+                self._node.get_subscriptions_info_by_topic
+                if sends
+                else self._node.get_publishers_info_by_topic
+            )
+            found += topic_misfits(name, type_name, look(name), sends, quality)
+        return found
+
 
 def topic_misfits(
     name: str,
@@ -46,18 +85,32 @@ def topic_misfits(
 
 
 def _why_not(sender: Any, receiver: Any) -> str:
-    """
-    Return why one quality of service does not do for the other; empty if it does.
-
-    Only policies that nodes set: of others a peer's are reported in another way than one's own.
-    """
+    """Return why one quality of service does not do for the other; empty if it does."""
     for policy, offered, wanted in (
         ('reliability', 'BEST_EFFORT', 'RELIABLE'),
         ('durability', 'VOLATILE', 'TRANSIENT_LOCAL'),
     ):
         if (getattr(sender, policy).name, getattr(receiver, policy).name) == (offered, wanted):
             return f'{policy} {offered.lower()} is sent, {wanted.lower()} is taken'
+    # No node asserts by hand that a publisher of the model lives, or promises when it sends again.
+    if receiver.liveliness.name == 'MANUAL_BY_TOPIC' != sender.liveliness.name:
+        return 'liveliness automatic is sent, manual_by_topic is taken'
+    for policy in ('deadline', 'liveliness_lease_duration'):
+        offered_s, wanted_s = (
+            _limit_s(getattr(quality, policy)) for quality in (sender, receiver)
+        )
+        if offered_s > wanted_s:
+            return f'{policy} {_shown(offered_s)} is sent, {_shown(wanted_s)} is taken'
     return ''
+
+
+def _limit_s(duration: Any) -> float:
+    is_limited = 0 < duration.nanoseconds < UNLIMITED_NS
+    return duration.nanoseconds / 1e9 if is_limited else float('inf')
+
+
+def _shown(limit_s: float) -> str:
+    return 'unlimited' if limit_s == float('inf') else f'of {limit_s:g} s'
 
 
 def service_misfits(

@@ -20,6 +20,21 @@ namespace robosc {
 /* Calls of one service whose reply is still listened for, so that a late one is noticed. */
 constexpr std::size_t MAXIMUM_PENDING = 16;
 
+/* Time for the last messages where the middleware does not say when they have arrived. */
+constexpr int UNACKNOWLEDGED_MS = 300;
+
+/* Whether the answer of a middleware to `wait_for_all_acked` is no empty one: Zenoh says at once that all has arrived.
+   Others are not known, and get the same time. */
+inline bool acknowledges(const std::string& middleware)
+{
+    for (const char* const known : {"rmw_fastrtps", "rmw_cyclonedds", "rmw_connextdds"}) {
+        if (middleware.rfind(known, 0) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
 enum class Quality { RELIABLE, BEST_EFFORT, LATCHED };
 
 inline rclcpp::QoS profile(Quality quality, std::size_t depth)

@@ -96,6 +96,12 @@ public:
     /* From now on hand on what comes. */
     void serve(Controller& controller) { controller_ = &controller; }
 
+    void add_troubles(Texts& found, const std::map<std::string, std::vector<std::string>>& offered) const
+    {
+        const std::string service = node_.get_node_services_interface()->resolve_service_name(name_);
+        add_other_types(found, offered, name_, service, rosidl_generator_traits::name<Service>());
+    }
+
     /* Answer a call; NULL: with the default response, and the reason in it. */
     void answer(std::uint32_t number, const void* message, const std::string& why)
     {
@@ -180,6 +186,14 @@ public:
     }
 
     void serve(Controller& controller) { controller_ = &controller; }
+
+    void add_troubles(Texts& found, const std::map<std::string, std::vector<std::string>>& offered) const
+    {
+        const std::string service
+            = node_.get_node_services_interface()->resolve_service_name(name_ + "/_action/send_goal");
+        const char* const type = rosidl_generator_traits::name<typename Action::Impl::SendGoalService>();
+        add_other_types(found, offered, name_, service, type);
+    }
 
     void accept(std::uint32_t number) { goals_[number] = Served{}; }
 

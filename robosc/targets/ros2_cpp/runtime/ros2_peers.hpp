@@ -8,11 +8,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <set>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -243,6 +246,26 @@ private:
     std::uint64_t denied_us_ = 0;
 };
 
+/* Seconds of a limit; a node's own profile shows 0 where there is none, others show the longest time. */
+inline double limit_s(const rclcpp::Duration& duration)
+{
+    const bool is_limited = duration.nanoseconds() > 0 && duration.nanoseconds() < INT64_MAX;
+    return is_limited ? static_cast<double>(duration.nanoseconds()) / 1e9 : std::numeric_limits<double>::infinity();
+}
+
+inline std::string shown(const rclcpp::Duration& duration)
+{
+    const double limit = limit_s(duration);
+    std::ostringstream text;
+    text << "of " << limit << " s";
+    return std::isinf(limit) ? "unlimited" : text.str();
+}
+
+inline std::string exceeded(const std::string& policy, const rclcpp::Duration& offered, const rclcpp::Duration& wanted)
+{
+    return policy + " " + shown(offered) + " is sent, " + shown(wanted) + " is taken";
+}
+
 /* Why one quality of service does not do for the other; empty if it does. */
 inline std::string why_not(const rclcpp::QoS& sender, const rclcpp::QoS& receiver)
 {
@@ -253,6 +276,18 @@ inline std::string why_not(const rclcpp::QoS& sender, const rclcpp::QoS& receive
     if (sender.durability() == rclcpp::DurabilityPolicy::Volatile
         && receiver.durability() == rclcpp::DurabilityPolicy::TransientLocal) {
         return "durability volatile is sent, transient_local is taken";
+    }
+    /* Nobody asserts by hand that a publisher of the model lives, or promises when it sends again. */
+    if (receiver.liveliness() == rclcpp::LivelinessPolicy::ManualByTopic
+        && sender.liveliness() != rclcpp::LivelinessPolicy::ManualByTopic) {
+        return "liveliness automatic is sent, manual_by_topic is taken";
+    }
+    if (limit_s(sender.deadline()) > limit_s(receiver.deadline())) {
+        return exceeded("deadline", sender.deadline(), receiver.deadline());
+    }
+    const rclcpp::Duration lease = sender.liveliness_lease_duration();
+    if (limit_s(lease) > limit_s(receiver.liveliness_lease_duration())) {
+        return exceeded("liveliness_lease_duration", lease, receiver.liveliness_lease_duration());
     }
     return "";
 }

@@ -30,6 +30,7 @@ def bundle(message: pb.Bundle) -> Bundle:
         libraries=_sorted_files(message.libraries),
         searched=tuple(message.searched),
         interfaces=_sorted_files(message.interfaces),
+        distribution=message.distribution,
     )
 
 

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <functional>
 #include <future>
 #include <initializer_list>
@@ -22,6 +23,7 @@
 #include "rcl_interfaces/msg/parameter_descriptor.hpp"
 #include "rcl_interfaces/msg/set_parameters_result.hpp"
 #include "rosidl_runtime_cpp/traits.hpp"
+#include "rmw/types.h"
 #include "stand_in.hpp"
 
 #define RCLCPP_STAND_IN_LOG(level, logger, ...)                                                                        \
@@ -38,6 +40,13 @@
     } while (0)
 #define RCLCPP_WARN(logger, ...) RCLCPP_STAND_IN_LOG("WARN", logger, __VA_ARGS__)
 #define RCLCPP_ERROR(logger, ...) RCLCPP_STAND_IN_LOG("ERROR", logger, __VA_ARGS__)
+
+// The middleware of the variable that chooses one; none of them is there.
+extern "C" inline const char* rmw_get_implementation_identifier(void)
+{
+    const char* const chosen = std::getenv("RMW_IMPLEMENTATION");
+    return chosen != nullptr ? chosen : "rmw_fastrtps_cpp";
+}
 
 namespace rclcpp {
 
@@ -167,6 +176,17 @@ enum class DurabilityPolicy { Volatile, TransientLocal };
 
 enum class ReliabilityPolicy { Reliable, BestEffort };
 
+enum class LivelinessPolicy { Automatic, ManualByTopic };
+
+class Duration {
+public:
+    explicit Duration(int64_t nanoseconds) : nanoseconds_(nanoseconds) {}
+    int64_t nanoseconds() const { return nanoseconds_; }
+
+private:
+    int64_t nanoseconds_;
+};
+
 class QoS {
 public:
     QoS(const KeepLast& history) : depth_(history.depth) {}  // NOLINT: it is implicit there, too
@@ -185,6 +205,25 @@ public:
     }
     DurabilityPolicy durability() const { return durability_; }
     ReliabilityPolicy reliability() const { return reliability_; }
+    // Only others have limits, as the line `shown` gives them; of a node's own profile they are 0.
+    QoS& deadline(const Duration& duration)
+    {
+        deadline_ = duration;
+        return *this;
+    }
+    QoS& liveliness_lease_duration(const Duration& duration)
+    {
+        lease_ = duration;
+        return *this;
+    }
+    QoS& liveliness(LivelinessPolicy policy)
+    {
+        liveliness_ = policy;
+        return *this;
+    }
+    Duration deadline() const { return deadline_; }
+    Duration liveliness_lease_duration() const { return lease_; }
+    LivelinessPolicy liveliness() const { return liveliness_; }
     size_t depth() const { return depth_; }
     int get_rmw_qos_profile() const { return 0; }
 
@@ -192,6 +231,9 @@ private:
     size_t depth_;
     ReliabilityPolicy reliability_ = ReliabilityPolicy::Reliable;
     DurabilityPolicy durability_ = DurabilityPolicy::Volatile;
+    LivelinessPolicy liveliness_ = LivelinessPolicy::Automatic;
+    Duration deadline_{0};
+    Duration lease_{0};
 };
 
 class ServicesQoS : public QoS {
@@ -242,10 +284,18 @@ public:
         std::getline(in, type_, ':');
         std::getline(in, policy, ':');
         gid_.fill(static_cast<uint8_t>(std::stoi(process)));
+        // Where others have no limit, the middleware shows the longest time.
+        quality_.deadline(Duration(INT64_MAX)).liveliness_lease_duration(Duration(INT64_MAX));
         if (policy == "best_effort") {
             quality_.best_effort();
         } else if (policy == "transient_local") {
             quality_.transient_local();
+        } else if (policy == "deadline") {
+            quality_.deadline(Duration(500000000));
+        } else if (policy == "lease") {
+            quality_.liveliness_lease_duration(Duration(2000000000));
+        } else if (policy == "manual") {
+            quality_.liveliness(LivelinessPolicy::ManualByTopic);
         }
     }
     const std::string& node_name() const { return name_; }
@@ -313,10 +363,6 @@ public:
 }  // namespace rclcpp
 
 // Of rcl and rmw, what clients are made with.
-struct rmw_request_id_t {
-    int64_t sequence_number;
-};
-
 struct rcl_client_options_t {
     int qos;
 };
@@ -523,6 +569,7 @@ class NodeServicesInterface {
 public:
     using SharedPtr = std::shared_ptr<NodeServicesInterface>;
     void add_client(std::shared_ptr<ClientBase>, CallbackGroup::SharedPtr) {}
+    std::string resolve_service_name(const std::string& name) const { return name.front() == '/' ? name : "/" + name; }
 };
 
 class NodeParametersInterface {

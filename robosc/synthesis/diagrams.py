@@ -6,8 +6,8 @@ from robosc.automata.state import Subject
 from robosc.errors import InternalError, UnsupportedModelError
 from robosc.supervisor import DecisionDiagram, DecisionNode
 from robosc.synthesis.compiled import TOTAL, kernel_of
-from robosc.synthesis.encoding import Bits, Encoding
-from robosc.synthesis.nodes import cofactors, is_constant
+from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.walks import Nodes, walked
 
 MAXIMUM_BRANCHES = 100_000
 """Ranges of one variable's values beyond which a diagram is refused."""
@@ -26,70 +26,67 @@ class _Extractor:
     of a predicate by setting its bits; what the other bits of the block then decide comes after it.
     """
 
-    def __init__(self, encoding: Encoding, maximum: int) -> None:
+    def __init__(self, encoding: Encoding, nodes: Nodes, maximum: int) -> None:
         self._encoding = encoding
-        self._manager = encoding.manager
-        self._level = {name: level for level, name in enumerate(encoding.order)}
-        self._home = {
-            name: (block, number)
-            for block in encoding.blocks
-            for number, subject in enumerate(block)
-            for name in encoding.subjects[subject].names
+        self._walk = nodes
+        self._level, self._split = nodes.level, nodes.split
+        self._block_at = {
+            level: number
+            for number, block in enumerate(encoding.levels)
+            for _, levels in block
+            for level in levels
         }
         self._maximum = self._left = maximum
         self._nodes: list[DecisionNode] = []
         self._numbers: dict[DecisionNode, int] = {}
-        self._known: dict[tuple[int, int], tuple[Any, int]] = {}
+        self._known: dict[tuple[Any, int], int] = {}
 
     def diagram(self, predicate: Any) -> DecisionDiagram:
-        root = self._number(predicate, 0)
+        root = self._number(self._walk.node(predicate), 0)
         return DecisionDiagram(tuple(self._nodes), root)
 
-    def _number(self, predicate: Any, first: int) -> int:
+    def _number(self, node: Any, first: int) -> int:
         """Return the number of a predicate in the diagram: 0 false, 1 true, from 2 on its nodes.
 
         Args:
-            predicate: The predicate.
+            node: The predicate.
             first: Number of places of the topmost variable's block that it does not depend on for certain.
         """
-        if is_constant(self._manager, predicate):
-            return int(predicate == self._manager.true)
-        key = int(predicate), first
+        key = node, first
         found = self._known.get(key)
         if found is None:
-            # The predicate is kept with its number: the engine could otherwise give its node to another one.
-            found = self._known[key] = (predicate, self._new_number(predicate, first))
-        return found[1]
+            level = self._level(node)
+            if level is None:
+                return int(node == self._walk.true)
+            found = self._known[key] = self._new_number(node, self._block_at[level], first)
+        return found
 
-    def _new_number(self, predicate: Any, first: int) -> int:
-        block = self._home[predicate.var][0]
-        for number in range(first, len(block)):
-            subject = block[number]
-            bits = self._encoding.subjects[subject]
-            starts: list[int] = []
-            children: list[int] = []
-            runs = self._runs(subject, bits, predicate, 0)
+    def _new_number(self, node: Any, block: int, first: int) -> int:
+        subjects, places = self._encoding.blocks[block], self._encoding.levels[block]
+        for number in range(first, len(places)):
+            size, levels = places[number]
+            runs = self._runs(subjects[number], levels, node, 0)
             if len(runs) == 1:
                 continue
             self._left -= len(runs)
             if self._left < 0:
-                raise _too_many_in_all(subject, self._maximum)
+                raise _too_many_in_all(subjects[number], self._maximum)
+            starts: list[int] = []
+            children: list[int] = []
             for start, below in runs:
-                if start >= len(bits.domain):
+                if start >= size:
                     # Codes from here on stand for no value: the predicate is ignored there.
                     break
-                child = self._child(below, block, number + 1)
+                level = self._level(below)
+                is_same = level is not None and self._block_at[level] == block
+                child = self._number(below, number + 1 if is_same else 0)
                 if not children or children[-1] != child:
                     starts.append(start)
                     children.append(child)
             if len(children) == 1:
                 return children[0]
-            return self._node(subject, tuple(starts), tuple(children))
+            return self._node(subjects[number], tuple(starts), tuple(children))
         raise InternalError("a predicate depends on none of the places that its topmost variable stands for")
-
-    def _child(self, below: Any, block: tuple[Subject, ...], first: int) -> int:
-        is_same = not is_constant(self._manager, below) and self._home[below.var][0] is block
-        return self._number(below, first if is_same else 0)
 
     def _node(self, subject: Subject, starts: tuple[int, ...], children: tuple[int, ...]) -> int:
         node = DecisionNode(subject.automaton, subject.variable, starts, children)
@@ -98,36 +95,25 @@ class _Extractor:
             self._nodes.append(node)
         return self._numbers[node]
 
-    def _runs(self, subject: Subject, bits: Bits, predicate: Any, place: int) -> list[_Run]:
+    def _runs(self, subject: Subject, levels: tuple[int, ...], node: Any, place: int) -> list[_Run]:
         """Return the cofactor of a predicate for each index of the bits from `place` on, equal neighbours merged."""
-        if place == len(bits.names) or self._is_below(predicate, bits.names[-1]):
-            return [(0, predicate)]
-        half = 1 << (len(bits.names) - place - 1)
-        low, high = self._split(predicate, bits.names[place])
-        runs = self._runs(subject, bits, low, place + 1)
-        if low == high:
+        level = self._level(node)
+        if level is None or place == len(levels) or level > levels[-1]:
+            return [(0, node)]
+        if level > levels[place]:
             # The bit does not matter: both halves look alike.
-            upper, runs = runs, list(runs)
+            runs = self._runs(subject, levels, node, place + 1)
+            upper = tuple(runs)
         else:
-            upper = self._runs(subject, bits, high, place + 1)
-        for start, below in upper:
-            if start or runs[-1][1] != below:
-                runs.append((half + start, below))
+            high, low = self._split(node) if level == levels[place] else self._walk.split_at(node, levels[place])
+            runs = self._runs(subject, levels, low, place + 1)
+            upper = tuple(runs) if low == high else self._runs(subject, levels, high, place + 1)
+        half = 1 << (len(levels) - place - 1)
+        last = runs[-1][1]
+        runs += [(half + start, below) for start, below in upper if start or below != last]
         if len(runs) > MAXIMUM_BRANCHES:
             raise _too_many_branches(subject)
         return runs
-
-    def _is_below(self, predicate: Any, name: str) -> bool:
-        """Return True if a predicate depends only on variables below a given one."""
-        return is_constant(self._manager, predicate) or self._level[predicate.var] > self._level[name]
-
-    def _split(self, predicate: Any, name: str) -> tuple[Any, Any]:
-        """A predicate where a variable is false, and where it is true."""
-        if predicate.var == name:
-            return cofactors(predicate)
-        if self._level[predicate.var] > self._level[name]:
-            return predicate, predicate
-        return self._manager.let({name: False}, predicate), self._manager.let({name: True}, predicate)
 
 
 def _too_many_branches(subject: Subject) -> UnsupportedModelError:
@@ -158,7 +144,7 @@ def extract(encoding: Encoding, predicate: Any, maximum: int = MAXIMUM_TOTAL) ->
     """
     kernel = kernel_of(encoding.manager)
     if kernel is None:
-        return _Extractor(encoding, maximum).diagram(predicate)
+        return walked(encoding.manager, lambda nodes: _Extractor(encoding, nodes, maximum).diagram(predicate))
     # Most predicates are about few places: a number is that of a place in these blocks.
     blocks = encoding.blocks_with(encoding.manager.support(predicate))
     found = kernel.extract(predicate, tuple(encoding.levels[block] for block in blocks), MAXIMUM_BRANCHES, maximum)

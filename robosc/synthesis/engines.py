@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from robosc.dd_modules import load_dd
+from robosc.oxidd_diagrams import OxiddManager
 from robosc.errors import NodeLimitError, RoboscError
 
 ENTRY_POINTS = "robosc.bdd_engines"
@@ -120,6 +121,10 @@ def _make_autoref() -> Manager:
     manager = load_dd("autoref").BDD()
     manager.configure(reordering=False)
     return manager  # type: ignore[no-any-return]
+
+
+def _make_oxidd() -> Manager:
+    return OxiddManager()
 
 
 def register(name: str, factory: Callable[[], Manager]) -> None:
@@ -273,6 +278,9 @@ def node_check(managers: Sequence[Manager], maximum_nodes: int | None) -> Callab
     """Return a check that raises NodeLimitError once some managers together have more nodes in use than they may."""
 
     def check() -> None:
+        for manager in managers:
+            if isinstance(manager, OxiddManager):
+                manager.tend()
         if (
             maximum_nodes is not None
             and sum(map(len, managers)) > maximum_nodes
@@ -332,4 +340,5 @@ def _has_cudd() -> bool:
 
 
 register("cudd", _make_cudd)
+register("oxidd", _make_oxidd)
 register("autoref", _make_autoref)

@@ -85,7 +85,7 @@ class Simplifier:
         }
         self._variables = encoding.all_of(map(self._manager.var, reversed(encoding.state_names)))
         self._formulas = Formulas(self._domains)
-        self._separating: dict[tuple[int, int], tuple[Any, Any, tuple[DecisionDiagram, ...]]] = {}
+        self._separating: dict[tuple[Any, Any], tuple[DecisionDiagram, ...]] = {}
         self._vain = 0
         self._end = None if seconds is None else monotonic() + seconds
         self._more, self._left = Effort(TOTAL_STEPS), MAXIMUM_EFFORT
@@ -223,12 +223,11 @@ class Simplifier:
 
     def _conditions_between(self, positive: Any, negative: Any) -> Sequence[DecisionDiagram]:
         """Conditions that are true in the positive states and false in the negative ones."""
-        # Many events of one system need the same conditions. The sets are kept with the conditions: the engine could
-        # otherwise give their numbers to other nodes.
-        key = int(positive), int(negative)
+        # Many events of one system need the same conditions.
+        key = positive, negative
         if key not in self._separating:
-            self._separating[key] = positive, negative, tuple(self._new_conditions(positive, negative))
-        return self._separating[key][2]
+            self._separating[key] = tuple(self._new_conditions(positive, negative))
+        return self._separating[key]
 
     def _new_conditions(self, positive: Any, negative: Any) -> Iterator[DecisionDiagram]:
         try:

@@ -4,5 +4,5 @@ from importlib.util import find_spec
 
 import pytest
 
-ENGINES = ("cudd", "autoref")
+ENGINES = ("cudd", "oxidd", "autoref")
 needs_cudd = pytest.mark.skipif(find_spec("dd.cudd") is None, reason="dd's C extension is not installed")

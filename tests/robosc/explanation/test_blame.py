@@ -25,7 +25,7 @@ from support.effort import seeds
 from support.empty_systems import empty_system
 from support.engines import needs_cudd
 
-ENGINES = ("cudd", "autoref")
+ENGINES = ("cudd", "oxidd", "autoref")
 EXAMPLES = 30
 LIMIT = 50_000
 

@@ -40,7 +40,7 @@ from support.random_systems import explicit_supervisor, random_system
 from support.systems import automaton, edge, operation, read
 from support.systems import system as system_of
 
-ENGINES = ("cudd", "autoref")
+ENGINES = ("cudd", "oxidd", "autoref")
 LIMIT = 50_000
 
 pytestmark = needs_cudd

@@ -70,7 +70,7 @@ def test_an_engine_of_another_package_that_cannot_be_loaded(monkeypatch: pytest.
         synthesize(EMPTY, engine="foreign")
 
 
-@pytest.mark.parametrize("name", ["cudd", "autoref"])
+@pytest.mark.parametrize("name", ["cudd", "oxidd", "autoref"])
 def test_a_manager_that_is_kept_ready_is_used_once(name: str) -> None:
     if name == "cudd":
         pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")

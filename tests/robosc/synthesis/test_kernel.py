@@ -154,7 +154,7 @@ def separated_one_by_one(manager: Manager, one: Any, other: Any, groups: list[tu
 
 
 @settings(max_examples=examples(120))
-@given(seed=st.integers(0, 2**32), engine=st.sampled_from(["cudd", "autoref"]))
+@given(seed=st.integers(0, 2**32), engine=st.sampled_from(["cudd", "oxidd", "autoref"]))
 def test_places_that_do_not_tell_sets_apart_are_left_out(seed: int, engine: str) -> None:
     """The kernel tries by halves, and Python place by place: both leave out what can go first."""
     dice = Random(seed)

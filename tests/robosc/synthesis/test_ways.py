@@ -22,7 +22,7 @@ from support.engines import needs_cudd
 from support.random_systems import random_system
 
 EXAMPLES = 60
-ENGINES = ("cudd", "autoref")
+ENGINES = ("cudd", "oxidd", "autoref")
 
 pytestmark = needs_cudd
 

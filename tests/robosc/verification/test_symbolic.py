@@ -80,10 +80,10 @@ def test_on_any_supervisor_it_agrees_with_the_explicit_search(made: System, seed
 @given(systems(), st.integers(0, 10**6))
 def test_both_engines_find_the_same_with_the_same_work(made: System, seed: int) -> None:
     added = _conditions(made, seed)
-    found = [verify_symbolically(made, added, engine=engine) for engine in ("cudd", "autoref")]
+    found = [verify_symbolically(made, added, engine=engine) for engine in ("cudd", "oxidd", "autoref")]
     assert found[0] == found[1]
     for limit in (100, 500, 2000):
-        ends = [verify_symbolically(made, added, engine=engine, limit=limit) for engine in ("cudd", "autoref")]
+        ends = [verify_symbolically(made, added, engine=engine, limit=limit) for engine in ("cudd", "oxidd", "autoref")]
         assert ends[0] == ends[1]
 
 
@@ -146,7 +146,7 @@ def test_a_run_is_found_even_where_a_shortest_one_is_too_much_work(made: System,
 
 
 @settings(max_examples=examples(25))
-@given(systems(), st.integers(0, 10**6), st.sampled_from(["cudd", "autoref"]), st.sampled_from([0, 64]))
+@given(systems(), st.integers(0, 10**6), st.sampled_from(["cudd", "oxidd", "autoref"]), st.sampled_from([0, 64]))
 def test_closures_are_those_of_steps_taken_until_nothing_is_new(
     made: System, seed: int, engine: str, many: int
 ) -> None:

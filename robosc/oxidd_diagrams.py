@@ -1,0 +1,448 @@
+"""Decision diagrams of OxiDD behind the interface that dd's have, in managers that grow.
+
+OxiDD (https://oxidd.net) has wheels for every version of Python and for all common machines. It wants to know at the
+beginning how many nodes there may be and how many results of operations it is to remember. The managers here begin
+small and are rebuilt into larger ones when they are full: a predicate stays the same object, and gets its node in the
+new manager.
+
+Source: N. Husung, C. Dubslaff, H. Hermanns and M. A. Koehl, "OxiDD: a safe, concurrent, modular, and performant
+decision diagram framework in Rust", TACAS 2024, LNCS 14572, pp. 255-275.
+"""
+
+import gc
+import mmap
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Self
+
+# OxiDD reads this whenever it makes a thread. With one thread all work is done by the caller, on the caller's stack.
+os.environ.setdefault("OXIDD_STACK_SIZE", str(2**18))
+
+from oxidd.bcdd import BCDDFunction, BCDDManager, BCDDSubstitution
+from oxidd.util import BooleanOperator, DDMemoryError
+
+FIRST_NODES = 2**22
+"""Nodes that a manager has room for at the beginning: memory is taken only for those that are there."""
+
+FIRST_SLOTS = 2**16
+"""Results of operations that a manager remembers at the beginning: setting them up takes half a millisecond."""
+
+MAXIMUM_SLOTS = 2**25
+MAXIMUM_NODES = 2**31
+
+_NODE_BYTES = 16
+_TABLE_BYTES = 12
+"""A node, and its place in the table of all nodes, once more while that table is enlarged."""
+
+_SLOT_BYTES = 20
+
+BELOW = 2**31
+"""Level of the constants."""
+
+
+class Predicate:
+    """A predicate in a manager: what dd calls a function.
+
+    Args:
+        manager: The manager.
+        function: The predicate in OxiDD's manager; it is another one once the manager has been rebuilt.
+    """
+
+    __slots__ = ("function", "manager")
+
+    def __init__(self, manager: "OxiddManager", function: BCDDFunction) -> None:
+        self.manager = manager
+        self.function = function
+
+    def __and__(self, other: Self) -> "Predicate":
+        try:
+            return Predicate(self.manager, self.function & other.function)
+        except DDMemoryError:
+            return self.manager.again(Predicate.__and__, self, other)
+
+    def __or__(self, other: Self) -> "Predicate":
+        try:
+            return Predicate(self.manager, self.function | other.function)
+        except DDMemoryError:
+            return self.manager.again(Predicate.__or__, self, other)
+
+    def __invert__(self) -> "Predicate":
+        return Predicate(self.manager, ~self.function)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Predicate) and self.function == other.function
+
+    def __hash__(self) -> int:
+        return hash(self.function)
+
+    @property
+    def var(self) -> str | None:
+        """Name of the topmost variable, or None for a constant."""
+        number = self.function.node_var()
+        return None if number is None else self.manager.names[number]
+
+    @property
+    def level(self) -> int:
+        """Level of the topmost variable; constants are below all of them."""
+        found = self.function.node_level()
+        return BELOW if found is None else found
+
+    @property
+    def dag_size(self) -> int:
+        """Number of nodes below this one, itself and the constant included."""
+        return self.function.node_count()
+
+    @property
+    def negated(self) -> bool:
+        """True if the predicate is the complement of its node."""
+        # Of a predicate and its complement, the one that is true where all variables are comes first.
+        return not self.function < ~self.function
+
+    @property
+    def low(self) -> "Predicate":
+        """Where the topmost variable of the node, which a complement has as well, is false."""
+        low = self.cofactors[0]
+        return ~low if self.negated else low
+
+    @property
+    def high(self) -> "Predicate":
+        """Where the topmost variable of the node is true."""
+        high = self.cofactors[1]
+        return ~high if self.negated else high
+
+    @property
+    def cofactors(self) -> "tuple[Predicate, Predicate]":
+        """The predicates where the topmost variable is false and true."""
+        found = self.function.cofactors()
+        if found is None:
+            raise ValueError("a constant has no cofactors")
+        return Predicate(self.manager, found[1]), Predicate(self.manager, found[0])
+
+
+class OxiddManager:
+    """A store of shared nodes over ordered Boolean variables, which grows.
+
+    Args:
+        nodes: Nodes that it has room for at the beginning.
+        slots: Results of operations that it remembers at the beginning.
+
+    Attributes:
+        names: The variables, in the order in which they were declared.
+        true: The predicate that is true everywhere.
+        false: The predicate that is true nowhere.
+        generation: Number of times that it has been rebuilt: what is made of OxiDD's functions holds for one of them.
+
+    Raises:
+        MemoryError: There is no room for a manager.
+    """
+
+    def __init__(self, nodes: int = FIRST_NODES, slots: int = FIRST_SLOTS) -> None:
+        self.names: list[str] = []
+        self.generation = 0
+        self._numbers: dict[str, int] = {}
+        self._maximum = MAXIMUM_NODES
+        self._is_reordering = False
+        self._is_in_order = True
+        self._open(nodes, slots)
+        self.true = Predicate(self, self._store.true())
+        self.false = Predicate(self, self._store.false())
+
+    def _open(self, nodes: int, slots: int) -> None:
+        """Begin with an empty store."""
+        nodes = _with_room(nodes, slots)
+        self._nodes, self._slots = nodes, slots
+        self._due = slots
+        self._store = BCDDManager(nodes, slots, 1)
+        self._store.add_named_vars(self.names)
+        self._variables = {name: self._store.var(number) for number, name in enumerate(self.names)}
+        self._no = self._store.false()
+        self._cubes: dict[tuple[str, ...], BCDDFunction] = {}
+        self._others: dict[int, BCDDFunction] = {}
+        self._supports: dict[BCDDFunction, int] = {}
+
+    # Memory
+
+    def __len__(self) -> int:
+        return self._store.num_inner_nodes()
+
+    def collect_garbage(self) -> None:
+        """Throw away what nobody needs."""
+        self._store.gc()
+
+    def limit(self, nodes: int) -> None:
+        """Let no single operation make more nodes than this."""
+        self._maximum = nodes
+        if self._nodes > nodes:
+            self._rebuild(nodes, self._slots)
+
+    def tend(self) -> None:
+        """Throw away what nobody needs if that is due; if much is left, remember more results from now on."""
+        made = self._store.approx_num_inner_nodes()
+        if made <= self._due:
+            return
+        self._supports.clear()
+        self._store.gc()
+        left = self._store.num_inner_nodes()
+        if self._is_reordering:
+            reorder(self)
+            left = self._store.num_inner_nodes()
+        if self._slots < MAXIMUM_SLOTS and (left > self._slots // 2 or made > 4 * self._due):
+            self._rebuild(max(self._nodes, min(8 * left, self._maximum)), min(MAXIMUM_SLOTS, 8 * self._slots))
+        self._due = max(self._slots, 3 * left)
+
+    def attempt[T](self, work: Callable[[], T]) -> T:
+        """Do some work on OxiDD's functions, which takes them from predicates each time that it is called.
+
+        Raises:
+            DDMemoryError: It needs more nodes than there may be.
+            MemoryError: There is no more room.
+        """
+        try:
+            return work()
+        except DDMemoryError:
+            return self.again(work)
+
+    def again[*Ts, T](self, work: Callable[[*Ts], T], *arguments: *Ts) -> T:
+        """Do some work that has failed for want of room again, with more of it.
+
+        Raises:
+            DDMemoryError: It needs more nodes than there may be.
+            MemoryError: There is no more room.
+        """
+        is_larger = False
+        while True:
+            self._store.gc()
+            if is_larger or len(self) > self._nodes // 2:
+                if self._nodes >= self._maximum:
+                    raise DDMemoryError("there are more nodes than there may be")
+                self._rebuild(min(8 * self._nodes, self._maximum), min(MAXIMUM_SLOTS, 8 * self._slots))
+            is_larger = True
+            try:
+                return work(*arguments)
+            except DDMemoryError:
+                continue
+
+    def _rebuild(self, nodes: int, slots: int) -> None:
+        """Go on in another store, with all predicates that there are."""
+        order = [self._store.level_to_var(level) for level in range(len(self.names))]
+        # Only the garbage collector knows all predicates: to note each of them would take longer than most operations.
+        predicates = [item for item in gc.get_referrers(self) if type(item) is Predicate]
+        old = self._store
+        try:
+            self._open(nodes, slots)
+        except MemoryError:
+            self._store = old
+            raise
+        self._store.set_var_order(order)
+        self.generation += 1
+        copy = _Copy(self._store)
+        for item in predicates:
+            item.function = copy.of(item.function)
+
+    # Order
+
+    def configure(self, **options: bool) -> dict[str, bool]:
+        """Set whether the order of variables may change; return what was set."""
+        before = {"reordering": self._is_reordering}
+        self._is_reordering = options.get("reordering", self._is_reordering)
+        return before
+
+    def set_order(self, names: Sequence[str]) -> None:
+        """Put variables into an order, topmost first."""
+        self._store.set_var_order([self._numbers[name] for name in names])
+        self._is_in_order = list(names) == self.names
+
+    def order(self) -> list[str]:
+        """The variables, topmost first."""
+        return [self.names[self._store.level_to_var(level)] for level in range(len(self.names))]
+
+    # Variables
+
+    def by_level(self) -> list[BCDDFunction]:
+        """Return the function of the variable at each level; they hold for one generation."""
+        if not self._is_in_order:
+            return [self._variables[name] for name in self.order()]
+        return list(self._variables.values())
+
+    def declare(self, *names: str) -> None:
+        """Add variables below those there are."""
+        new = [name for name in dict.fromkeys(names) if name not in self._numbers]
+        for number in self._store.add_named_vars(new):
+            name = self._store.var_name(number)
+            self._numbers[name] = number
+            self.names.append(name)
+            self._variables[name] = self._store.var(number)
+
+    def var(self, name: str) -> Predicate:
+        """The predicate that a variable is true."""
+        return Predicate(self, self._variables[name])
+
+    # Operations
+
+    def ite(self, test: Predicate, then: Predicate, otherwise: Predicate) -> Predicate:
+        """Return the predicate that is `then` where `test` is true, and `otherwise` elsewhere."""
+        try:
+            return Predicate(self, test.function.ite(then.function, otherwise.function))
+        except DDMemoryError:
+            return self.again(self.ite, test, then, otherwise)
+
+    def let(self, definitions: Mapping[str, Any], node: Predicate) -> Predicate:
+        """Substitute variables at once: all by truth values, all by names, or all by predicates."""
+        try:
+            return Predicate(self, node.function.substitute(self.substitution(definitions)))
+        except DDMemoryError:
+            return self.again(self.let, definitions, node)
+
+    def substitution(self, definitions: Mapping[str, Any]) -> BCDDSubstitution:
+        """Return what OxiDD substitutes, with definitions as `let` has them; it holds for one generation."""
+        return BCDDFunction.make_substitution(
+            [(self._numbers[name], self._function(value)) for name, value in definitions.items()]
+        )
+
+    def _function(self, value: bool | str | Predicate) -> BCDDFunction:
+        if isinstance(value, Predicate):
+            return value.function
+        if isinstance(value, str):
+            return self._variables[value]
+        return self._store.true() if value else self._no
+
+    def cube(self, values: Mapping[str, bool]) -> Predicate:
+        """Return the predicate that some variables have some values."""
+        level = self._store.var_to_level
+        found = self._store.true()
+        for name in sorted(values, key=lambda name: level(self._numbers[name]), reverse=True):
+            variable = self._variables[name]
+            found = found & (variable if values[name] else ~variable)
+        return Predicate(self, found)
+
+    def support(self, node: Predicate) -> set[str]:
+        """Return the variables that a predicate depends on."""
+        mask = self._support(node.function)
+        found = set[str]()
+        while mask:
+            last = mask & -mask
+            found.add(self.names[last.bit_length() - 1])
+            mask ^= last
+        return found
+
+    def _support(self, function: BCDDFunction) -> int:
+        """Return the numbers of the variables that a function depends on, as bits; the order may change meanwhile."""
+        known = self._supports
+        found = known.get(function)
+        if found is not None:
+            return found
+        number = function.node_var()
+        if number is None:
+            return 0
+        high, low = function.cofactors()  # type: ignore[misc]  # it is no constant
+        found = known[function] = 1 << number | self._support(high) | self._support(low)
+        return found
+
+    def variables(self, names: Iterable[str]) -> BCDDFunction:
+        """Return the conjunction of variables; it holds for one generation."""
+        key = tuple(names)
+        found = self._cubes.get(key)
+        if found is None:
+            found = self._cubes[key] = self.cube(dict.fromkeys(key, True)).function
+        return found
+
+    def exist(self, names: Iterable[str], node: Predicate) -> Predicate:
+        """Return the predicate that is true where some value of the variables makes a predicate true."""
+        names = tuple(names)
+        try:
+            return Predicate(self, node.function.exists(self.variables(names)))
+        except DDMemoryError:
+            return self.again(self.exist, names, node)
+
+    def projected(self, node: Predicate, other: Predicate) -> Predicate:
+        """Return the predicate that is true where some value of what another one does not depend on makes one true."""
+        mask = self._support(other.function)
+        try:
+            cube = self._others.get(mask)
+            if cube is None:
+                names = [name for number, name in enumerate(self.names) if not mask >> number & 1]
+                cube = self._others[mask] = self.variables(names)
+            return Predicate(self, node.function.exists(cube))
+        except DDMemoryError:
+            return self.again(self.projected, node, other)
+
+    def and_exist(self, names: Iterable[str], node: Predicate, other: Predicate) -> Predicate:
+        """Return the predicate that is true where some value of the variables makes both of two predicates true."""
+        names = tuple(names)
+        try:
+            cube = self.variables(names)
+            return Predicate(self, node.function.apply_exists(BooleanOperator.AND, other.function, cube))
+        except DDMemoryError:
+            return self.again(self.and_exist, names, node, other)
+
+    def implies(self, node: Predicate, other: Predicate) -> bool:
+        """Return True if a predicate is true only where another one is."""
+        try:
+            return (node.function & ~other.function) == self._no
+        except DDMemoryError:
+            return self.again(self.implies, node, other)
+
+
+def reorder(manager: OxiddManager, levels: Mapping[str, int] | None = None) -> None:
+    """Put the variables into an order, or into a better one: a variable at a time goes where diagrams are smallest.
+
+    Source: R. Rudell, "Dynamic variable ordering for ordered binary decision diagrams", ICCAD 1993, pp. 42-47.
+
+    Args:
+        manager: The manager.
+        levels: The level of each variable; None for a better order.
+    """
+    if levels is not None:
+        manager.set_order(sorted(levels, key=levels.__getitem__))
+        return
+    order = manager.order()
+    for name in tuple(order):
+        best, least = order, len(manager)
+        for place in range(len(order)):
+            others = [other for other in order if other != name]
+            tried = [*others[:place], name, *others[place:]]
+            manager.set_order(tried)
+            if len(manager) < least:
+                best, least = tried, len(manager)
+        manager.set_order(best)
+        order = best
+
+
+def _with_room(nodes: int, slots: int) -> int:
+    """Return the number of nodes, at most as many as given, that there is memory for.
+
+    Raises:
+        MemoryError: There is memory for a few at most.
+    """
+    # OxiDD ends the process where it is refused memory.
+    while True:
+        try:
+            mmap.mmap(-1, (_NODE_BYTES + _TABLE_BYTES) * nodes + _SLOT_BYTES * slots).close()
+            return nodes
+        except (OSError, ValueError) as error:
+            nodes //= 2
+            if nodes < slots:
+                raise MemoryError("the decision diagrams were refused memory") from error
+
+
+class _Copy:
+    """Copies functions into a store with the same order of variables."""
+
+    def __init__(self, store: BCDDManager) -> None:
+        self._store = store
+        self._variables = [store.var(number) for number in range(store.num_vars())]
+        self._known: dict[BCDDFunction, BCDDFunction] = {}
+        self._true = store.true()
+
+    def of(self, function: BCDDFunction) -> BCDDFunction:
+        number = function.node_var()
+        if number is None:
+            return self._true if function.valid() else ~self._true
+        found = self._known.get(function)
+        if found is None:
+            opposite = self._known.get(~function)
+            if opposite is not None:
+                return ~opposite
+            high, low = function.cofactors()  # type: ignore[misc]  # it is no constant
+            found = self._known[function] = self._variables[number].ite(self.of(high), self.of(low))
+        return found

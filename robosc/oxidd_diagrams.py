@@ -36,6 +36,9 @@ _TABLE_BYTES = 12
 
 _SLOT_BYTES = 20
 
+_MAXIMUM_RESTRICTED = 200_000
+"""Results of restriction that are kept for others."""
+
 BELOW = 2**31
 """Level of the constants."""
 
@@ -157,8 +160,14 @@ class OxiddManager:
         self._variables = {name: self._store.var(number) for number, name in enumerate(self.names)}
         self._no = self._store.false()
         self._cubes: dict[tuple[str, ...], BCDDFunction] = {}
-        self._others: dict[int, BCDDFunction] = {}
-        self._supports: dict[BCDDFunction, int] = {}
+        self._masks: dict[tuple[str, ...], int] = {}
+        self._restricted: dict[tuple[BCDDFunction, BCDDFunction], BCDDFunction] = {}
+
+    def restricted(self) -> dict[tuple[BCDDFunction, BCDDFunction], BCDDFunction]:
+        """Return what is known of functions restricted to others: the conditions of one system are alike in part."""
+        if len(self._restricted) > _MAXIMUM_RESTRICTED:
+            self._restricted = {}
+        return self._restricted
 
     # Memory
 
@@ -180,7 +189,7 @@ class OxiddManager:
         made = self._store.approx_num_inner_nodes()
         if made <= self._due:
             return
-        self._supports.clear()
+        self._restricted = {}
         self._store.gc()
         left = self._store.num_inner_nodes()
         if self._is_reordering:
@@ -251,18 +260,19 @@ class OxiddManager:
         """Put variables into an order, topmost first."""
         self._store.set_var_order([self._numbers[name] for name in names])
         self._is_in_order = list(names) == self.names
+        self._masks.clear()
 
     def order(self) -> list[str]:
         """The variables, topmost first."""
+        if self._is_in_order:
+            return self.names
         return [self.names[self._store.level_to_var(level)] for level in range(len(self.names))]
 
     # Variables
 
     def by_level(self) -> list[BCDDFunction]:
         """Return the function of the variable at each level; they hold for one generation."""
-        if not self._is_in_order:
-            return [self._variables[name] for name in self.order()]
-        return list(self._variables.values())
+        return [self._variables[name] for name in self.order()]
 
     def declare(self, *names: str) -> None:
         """Add variables below those there are."""
@@ -315,27 +325,35 @@ class OxiddManager:
             found = found & (variable if values[name] else ~variable)
         return Predicate(self, found)
 
-    def support(self, node: Predicate) -> set[str]:
-        """Return the variables that a predicate depends on."""
-        mask = self._support(node.function)
-        found = set[str]()
-        while mask:
-            last = mask & -mask
-            found.add(self.names[last.bit_length() - 1])
-            mask ^= last
-        return found
+    def support(self, node: Predicate, among: tuple[str, ...] | None = None) -> set[str]:
+        """Return the variables that a predicate depends on.
 
-    def _support(self, function: BCDDFunction) -> int:
-        """Return the numbers of the variables that a function depends on, as bits; the order may change meanwhile."""
-        known = self._supports
-        found = known.get(function)
-        if found is not None:
-            return found
-        number = function.node_var()
-        if number is None:
-            return 0
-        high, low = function.cofactors()  # type: ignore[misc]  # it is no constant
-        found = known[function] = 1 << number | self._support(high) | self._support(low)
+        Args:
+            node: The predicate.
+            among: Variables of which it depends on no other, as far as is known: mostly few nodes are looked at then.
+        """
+        possible = (1 << len(self.names)) - 1
+        if among is not None:
+            possible = self._masks.get(among) or self._levels(among)
+        found, seen, stack = 0, set[BCDDFunction](), [node.function]
+        while stack:
+            item = stack.pop()
+            level = item.node_level()
+            if level is not None and (possible & ~found) >> level and item not in seen:
+                seen.add(item)
+                found |= 1 << level
+                stack += item.cofactors()  # type: ignore[arg-type]  # it is no constant
+        order, names = self.order(), set[str]()
+        while found:
+            lowest = found & -found
+            names.add(order[lowest.bit_length() - 1])
+            found ^= lowest
+        return names
+
+    def _levels(self, names: tuple[str, ...]) -> int:
+        """Return the levels of variables, as bits."""
+        level_of = self._store.var_to_level
+        found = self._masks[names] = sum(1 << level_of(self._numbers[name]) for name in names)
         return found
 
     def variables(self, names: Iterable[str]) -> BCDDFunction:
@@ -354,17 +372,15 @@ class OxiddManager:
         except DDMemoryError:
             return self.again(self.exist, names, node)
 
-    def projected(self, node: Predicate, other: Predicate) -> Predicate:
-        """Return the predicate that is true where some value of what another one does not depend on makes one true."""
-        mask = self._support(other.function)
+    def without(self, node: Predicate, cubes: Sequence[Predicate]) -> Predicate:
+        """Return a predicate without the variables of some cubes: they may have any value."""
         try:
-            cube = self._others.get(mask)
-            if cube is None:
-                names = [name for number, name in enumerate(self.names) if not mask >> number & 1]
-                cube = self._others[mask] = self.variables(names)
-            return Predicate(self, node.function.exists(cube))
+            all_ = self._store.true()
+            for cube in cubes:
+                all_ = all_ & cube.function
+            return Predicate(self, node.function.exists(all_))
         except DDMemoryError:
-            return self.again(self.projected, node, other)
+            return self.again(self.without, node, cubes)
 
     def and_exist(self, names: Iterable[str], node: Predicate, other: Predicate) -> Predicate:
         """Return the predicate that is true where some value of the variables makes both of two predicates true."""

@@ -15,8 +15,11 @@ MAXIMUM_BRANCHES = 100_000
 MAXIMUM_TOTAL = 400_000
 """Ranges that all nodes of a diagram together may distinguish."""
 
-_Run = tuple[int, Any]
-"""A first index and the predicate that holds from there on."""
+MAXIMUM_KEPT = 1_000
+"""Ranges of a node up to which they are kept: other nodes above it need them again."""
+
+_Runs = tuple[tuple[int, ...], tuple[Any, ...]]
+"""First indices of ranges, and the predicate that holds in each of them."""
 
 
 class _Extractor:
@@ -39,54 +42,102 @@ class _Extractor:
         self._maximum = self._left = maximum
         self._nodes: list[DecisionNode] = []
         self._numbers: dict[DecisionNode, int] = {}
+        self._constants = {nodes.false: 0, nodes.true: 1}
+        # The numbers of nodes by themselves, and of those that come from places of the same block.
+        self._done = dict(self._constants)
         self._known: dict[tuple[Any, int], int] = {}
+        self._found: dict[tuple[Any, int], _Runs] = {}
 
     def diagram(self, predicate: Any) -> DecisionDiagram:
-        root = self._number(self._walk.node(predicate), 0)
-        return DecisionDiagram(tuple(self._nodes), root)
+        root = self._walk.node(predicate)
+        found = self._done.get(root)
+        if found is None:
+            found = self._number(root, -1, 0)
+        return DecisionDiagram(tuple(self._nodes), found)
 
-    def _number(self, node: Any, first: int) -> int:
-        """Return the number of a predicate in the diagram: 0 false, 1 true, from 2 on its nodes.
+    def _number(self, node: Any, block: int, first: int) -> int:
+        """Return the number of a node in the diagram, from 2 on; it is no constant.
 
         Args:
-            node: The predicate.
-            first: Number of places of the topmost variable's block that it does not depend on for certain.
+            node: The node.
+            block: The block that it comes from.
+            first: Number of places of that block that it does not depend on for certain.
         """
+        own = self._block_at[self._level(node)]
+        if own != block or not first:
+            found = self._done.get(node)
+            if found is None:
+                found = self._done[node] = self._new_number(node, own, 0)
+            return found
         key = node, first
         found = self._known.get(key)
         if found is None:
-            level = self._level(node)
-            if level is None:
-                return int(node == self._walk.true)
-            found = self._known[key] = self._new_number(node, self._block_at[level], first)
+            found = self._known[key] = self._new_number(node, own, first)
         return found
 
     def _new_number(self, node: Any, block: int, first: int) -> int:
         subjects, places = self._encoding.blocks[block], self._encoding.levels[block]
+        known = self._done if len(places) == 1 else self._constants
         for number in range(first, len(places)):
-            size, levels = places[number]
-            runs = self._runs(subjects[number], levels, node, 0)
+            subject, (size, levels) = subjects[number], places[number]
+            runs, below = self._runs(subject, levels, node, 0)
             if len(runs) == 1:
                 continue
             self._left -= len(runs)
             if self._left < 0:
-                raise _too_many_in_all(subjects[number], self._maximum)
+                raise _too_many_in_all(subject, self._maximum)
             starts: list[int] = []
             children: list[int] = []
-            for start, below in runs:
+            last = -1
+            for start, item in zip(runs, below, strict=True):
                 if start >= size:
                     # Codes from here on stand for no value: the predicate is ignored there.
                     break
-                level = self._level(below)
-                is_same = level is not None and self._block_at[level] == block
-                child = self._number(below, number + 1 if is_same else 0)
-                if not children or children[-1] != child:
+                child = known.get(item)
+                if child is None:
+                    child = self._number(item, block, number + 1)
+                if child != last:
                     starts.append(start)
                     children.append(child)
+                    last = child
             if len(children) == 1:
                 return children[0]
-            return self._node(subjects[number], tuple(starts), tuple(children))
+            return self._node(subject, tuple(starts), tuple(children))
         raise InternalError("a predicate depends on none of the places that its topmost variable stands for")
+
+    def _node(self, subject: Subject, starts: tuple[int, ...], children: tuple[int, ...]) -> int:
+        node = DecisionNode(subject.automaton, subject.variable, starts, children)
+        found = self._numbers.get(node)
+        if found is None:
+            found = self._numbers[node] = len(self._nodes) + 2
+            self._nodes.append(node)
+        return found
+
+    def _runs(self, subject: Subject, levels: tuple[int, ...], node: Any, place: int) -> _Runs:
+        """Return the cofactor of a predicate for each index of the bits from `place` on, equal neighbours merged."""
+        level = self._level(node)
+        if level is None or place == len(levels) or level > levels[-1]:
+            return (0,), (node,)
+        at = levels[place]
+        key = node, at
+        found = self._found.get(key)
+        if found is not None:
+            return found
+        if level > at:
+            # The bit does not matter: both halves look alike.
+            starts, below = high_starts, high_below = self._runs(subject, levels, node, place + 1)
+        else:
+            high, low = self._split(node) if level == at else self._walk.split_at(node, at)
+            starts, below = self._runs(subject, levels, low, place + 1)
+            high_starts, high_below = self._runs(subject, levels, high, place + 1)
+        half = 1 << (len(levels) - place - 1)
+        same = 1 if below[-1] == high_below[0] else 0
+        found = (*starts, *[half + start for start in high_starts[same:]]), below + high_below[same:]
+        if len(found[0]) > MAXIMUM_BRANCHES:
+            raise _too_many_branches(subject)
+        if len(found[0]) <= MAXIMUM_KEPT:
+            self._found[key] = found
+        return found
 
     def _node(self, subject: Subject, starts: tuple[int, ...], children: tuple[int, ...]) -> int:
         node = DecisionNode(subject.automaton, subject.variable, starts, children)
@@ -94,26 +145,6 @@ class _Extractor:
             self._numbers[node] = len(self._nodes) + 2
             self._nodes.append(node)
         return self._numbers[node]
-
-    def _runs(self, subject: Subject, levels: tuple[int, ...], node: Any, place: int) -> list[_Run]:
-        """Return the cofactor of a predicate for each index of the bits from `place` on, equal neighbours merged."""
-        level = self._level(node)
-        if level is None or place == len(levels) or level > levels[-1]:
-            return [(0, node)]
-        if level > levels[place]:
-            # The bit does not matter: both halves look alike.
-            runs = self._runs(subject, levels, node, place + 1)
-            upper = tuple(runs)
-        else:
-            high, low = self._split(node) if level == levels[place] else self._walk.split_at(node, levels[place])
-            runs = self._runs(subject, levels, low, place + 1)
-            upper = tuple(runs) if low == high else self._runs(subject, levels, high, place + 1)
-        half = 1 << (len(levels) - place - 1)
-        last = runs[-1][1]
-        runs += [(half + start, below) for start, below in upper if start or below != last]
-        if len(runs) > MAXIMUM_BRANCHES:
-            raise _too_many_branches(subject)
-        return runs
 
 
 def _too_many_branches(subject: Subject) -> UnsupportedModelError:

@@ -158,6 +158,11 @@ class _Counter:
         return found
 
 
+def support_among(manager: Manager, names: tuple[str, ...], node: Any) -> set[str]:
+    """Return the variables that a predicate depends on, which are some of those given."""
+    return manager.support(node, names) if isinstance(manager, OxiddManager) else manager.support(node)
+
+
 def without(manager: Manager, states: Any, cubes: Sequence[Any]) -> Any:
     """States with the variables of some cubes quantified: they may have any value.
 
@@ -169,6 +174,8 @@ def without(manager: Manager, states: Any, cubes: Sequence[Any]) -> Any:
     kernel = kernel_of(manager)
     if kernel is not None:
         return kernel.without(states, cubes)
+    if isinstance(manager, OxiddManager):
+        return manager.without(states, cubes)
     names = [name for cube in cubes for name in manager.support(cube)]
     return manager.exist(names, states) if names else states
 
@@ -199,9 +206,6 @@ def restrict(manager: Manager, node: Any, care: Any) -> Any:
     kernel = kernel_of(manager)
     if kernel is not None:
         return kernel.restrict(node, care)
-    if isinstance(manager, OxiddManager):
-        # What `node` does not depend on, the walk would forget on its way, wherever it meets it.
-        care = manager.projected(care, node)
     return walked(manager, lambda nodes: nodes.predicate(_Restrict(nodes).walk(nodes.node(node), nodes.node(care))))
 
 
@@ -209,26 +213,30 @@ class _Restrict:
     def __init__(self, nodes: Nodes) -> None:
         self._nodes = nodes
         self._level, self._split, self._false = nodes.level, nodes.split, nodes.false
-        self._known: dict[tuple[Any, Any], Any] = {}
+        self._known = nodes.restricted
 
     def walk(self, f: Any, c: Any) -> Any:
-        key = (f, c)
-        found = self._known.get(key)
-        if found is not None:
-            return found
-        here, level = self._level(f), self._level(c)
-        if here is None or level is None:
-            return f
-        if level < here:
-            found = self.walk(f, self._nodes.either(*self._split(c)))
-        else:
-            high_c, low_c = self._split(c) if level == here else (c, c)
+        while True:
+            key = (f, c)
+            found = self._known.get(key)
+            if found is not None:
+                return found
+            here, level = self._level(f), self._level(c)
+            if here is None or level is None:
+                return f
+            if level < here:
+                c = self._nodes.either(*self._split(c))
+                continue
             high_f, low_f = self._split(f)
-            if low_c == self._false:
-                found = self.walk(high_f, high_c)
-            elif high_c == self._false:
-                found = self.walk(low_f, low_c)
+            if level > here:
+                high_c = low_c = c
             else:
-                found = self._nodes.joined(here, self.walk(high_f, high_c), self.walk(low_f, low_c))
-        self._known[key] = found
-        return found
+                high_c, low_c = self._split(c)
+                if low_c == self._false:
+                    f, c = high_f, high_c
+                    continue
+                if high_c == self._false:
+                    f, c = low_f, low_c
+                    continue
+            found = self._known[key] = self._nodes.joined(here, self.walk(high_f, high_c), self.walk(low_f, low_c))
+            return found

@@ -31,7 +31,7 @@ from robosc.supervisor.diagram import Subject as Place
 from robosc.supervisor.diagram import diagram_domains
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.encoding import Encoding
-from robosc.synthesis.nodes import implies, restrict, separated, without
+from robosc.synthesis.nodes import implies, restrict, separated, support_among, without
 
 MAXIMUM_NODES = 20_000
 """Nodes of what matters up to which more than restricting is tried."""
@@ -211,7 +211,8 @@ class Simplifier:
 
     def _places(self, *predicates: Any) -> set[Subject]:
         """The places that predicates depend on."""
-        return {self._home[name] for item in predicates for name in self._manager.support(item)}
+        names = self._encoding.state_names
+        return {self._home[name] for item in predicates for name in support_among(self._manager, names, item)}
 
     def _over(self, places: set[Subject], wanted: Any, care: Any) -> tuple[Any, Any]:
         """The values that some places have in the states that matter, where a condition is true and where not."""

@@ -20,6 +20,7 @@ class Nodes(Protocol):
         level: Return the level of a node, or None for a constant.
         split: Return what is below a node that is no constant: where its variable is true, and where it is false.
         either: Return the node that is true where one of two is.
+        restricted: What has been found for nodes restricted to others.
     """
 
     true: Any
@@ -28,6 +29,7 @@ class Nodes(Protocol):
     level: Callable[[Any], int | None]
     split: Callable[[Any], tuple[Any, Any]]
     either: Callable[[Any, Any], Any]
+    restricted: dict[tuple[Any, Any], Any]
 
     def split_at(self, node: Any, level: int) -> tuple[Any, Any]:
         """Return what is left of a node where the variable of a level, not above it, is true, and where it is false."""
@@ -55,6 +57,7 @@ class OxiddNodes:
         self._manager = manager
         self.true = manager.true.function
         self.false = manager.false.function
+        self.restricted = manager.restricted()
         self._variables = manager.by_level()
 
     def split_at(self, node: Any, level: int) -> tuple[Any, Any]:
@@ -85,6 +88,7 @@ class DdNodes:
         self._manager = manager
         self.true = manager.true
         self.false = manager.false
+        self.restricted = {}
         self._names: dict[int, str] = {}
 
     @staticmethod

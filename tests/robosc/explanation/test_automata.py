@@ -65,7 +65,7 @@ def explained(system: System, state: str | None = None) -> Explanation:
     pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
     words = SystemWords(system)
     results = [explain_synthesis(words, engine=engine, state=state) for engine in ("cudd", "oxidd", "autoref")]
-    assert results[0] == results[1]
+    assert results == results[:1] * len(results)
     assert explanation_text(results[0])
     return results[0]
 

@@ -58,7 +58,7 @@ def explained(text: str, **asked: Any) -> Explanation:
         explain_synthesis(ModelWords(found.model, found.places, system, Deployment.CONTROLLER), engine=engine, **asked)
         for engine in ("cudd", "oxidd", "autoref")
     ]
-    assert results[0] == results[1]
+    assert results == results[:1] * len(results)
     assert explanation_text(results[0])
     return results[0]
 

@@ -42,7 +42,7 @@ def test_an_engine_can_be_registered(monkeypatch: pytest.MonkeyPatch) -> None:
         return module.make_manager("autoref")
 
     register("mine", factory)
-    assert engine_names() == ("autoref", "cudd", "mine")
+    assert engine_names() == ("autoref", "cudd", "mine", "oxidd")
     result = synthesize(EMPTY, engine="mine")
     assert (result.status, result.statistics.engine, made) == (SynthesisStatus.SUPERVISOR, "mine", ["mine"])
 
@@ -59,7 +59,7 @@ def offer(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
 
 def test_an_engine_of_another_package_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     offer(monkeypatch, "dd.autoref:BDD")
-    assert engine_names() == ("autoref", "cudd", "foreign")
+    assert engine_names() == ("autoref", "cudd", "foreign", "oxidd")
     assert synthesize(EMPTY, engine="foreign").statistics.engine == "foreign"
 
 

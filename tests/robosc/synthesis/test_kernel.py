@@ -26,6 +26,7 @@ from robosc.synthesis.monitor import BoundedMonitor, ProgressMonitor
 from robosc.synthesis.result import Closure
 from robosc.synthesis.saturation import CompiledSaturation, Saturation, saturation
 from robosc.synthesis.step import Step
+from robosc.synthesis.walks import DdNodes
 from support.effort import examples
 from support.families import FAMILIES
 
@@ -130,7 +131,7 @@ def test_it_restricts_as_python_does(seed: int) -> None:
     predicate, care = (random_predicate(manager, dice, PLACES, 5) for _ in range(2))
     found = kernel_of(manager)
     assert found is not None
-    assert found.restrict(predicate, care) == nodes._Restrict(manager).walk(predicate, care)
+    assert found.restrict(predicate, care) == nodes._Restrict(DdNodes(manager)).walk(predicate, care)
 
 
 @settings(max_examples=examples(60))

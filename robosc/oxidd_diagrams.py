@@ -13,6 +13,7 @@ import gc
 import mmap
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, Self
 
 # OxiDD reads this whenever it makes a thread. With one thread all work is done by the caller, on the caller's stack.
@@ -21,8 +22,14 @@ os.environ.setdefault("OXIDD_STACK_SIZE", str(2**18))
 from oxidd.bcdd import BCDDFunction, BCDDManager, BCDDSubstitution
 from oxidd.util import BooleanOperator, DDMemoryError
 
-FIRST_NODES = 2**22
-"""Nodes that a manager has room for at the beginning: memory is taken only for those that are there."""
+FIRST_NODES = 2**24
+"""Nodes that a manager has room for at the beginning: memory is taken only for those that are there.
+
+An operation that needs more begins anew in a larger manager. It cannot be interrupted, but it can be in between.
+"""
+
+_SHARE = 4
+"""Times the memory for a new manager that there has to be: others will be made, and Python wants some, too."""
 
 FIRST_SLOTS = 2**16
 """Results of operations that a manager remembers at the beginning: setting them up takes half a millisecond."""
@@ -30,11 +37,21 @@ FIRST_SLOTS = 2**16
 MAXIMUM_SLOTS = 2**25
 MAXIMUM_NODES = 2**31
 
+_NODES_GROW = 4
+_SLOTS_GROW = 8
+"""Factors by which managers become larger."""
+
+_MOVES = 2_000
+"""Places at which variables are tried when a better order is looked for: each takes half a millisecond at least."""
+
 _NODE_BYTES = 16
 _TABLE_BYTES = 12
 """A node, and its place in the table of all nodes, once more while that table is enlarged."""
 
 _SLOT_BYTES = 20
+
+_THREAD_BYTES = 2**22
+"""Stacks of the threads that OxiDD makes for each manager, which mostly wait."""
 
 _MAXIMUM_RESTRICTED = 200_000
 """Results of restriction that are kept for others."""
@@ -133,6 +150,7 @@ class OxiddManager:
         names: The variables, in the order in which they were declared.
         true: The predicate that is true everywhere.
         false: The predicate that is true nowhere.
+        pause: Called before an operation begins anew with more room: it may end the work with an error.
         generation: Number of times that it has been rebuilt: what is made of OxiDD's functions holds for one of them.
 
     Raises:
@@ -142,17 +160,19 @@ class OxiddManager:
     def __init__(self, nodes: int = FIRST_NODES, slots: int = FIRST_SLOTS) -> None:
         self.names: list[str] = []
         self.generation = 0
+        self.pause: Callable[[], None] = lambda: None
         self._numbers: dict[str, int] = {}
         self._maximum = MAXIMUM_NODES
         self._is_reordering = False
         self._is_in_order = True
-        self._open(nodes, slots)
+        self._is_last_attempt = False
+        self._open(nodes, slots, 2 * slots)
         self.true = Predicate(self, self._store.true())
         self.false = Predicate(self, self._store.false())
 
-    def _open(self, nodes: int, slots: int) -> None:
-        """Begin with an empty store."""
-        nodes = _with_room(nodes, slots)
+    def _open(self, nodes: int, slots: int, least: int) -> None:
+        """Begin with an empty store of some nodes, or of fewer if there is no room, but not of fewer than the least."""
+        nodes = _with_room(nodes, slots, least, 1 if self.generation else _SHARE)
         self._nodes, self._slots = nodes, slots
         self._due = slots
         self._store = BCDDManager(nodes, slots, 1)
@@ -176,27 +196,37 @@ class OxiddManager:
 
     def collect_garbage(self) -> None:
         """Throw away what nobody needs."""
+        self._cubes.clear()
+        self._restricted.clear()
         self._store.gc()
 
     def limit(self, nodes: int) -> None:
-        """Let no single operation make more nodes than this."""
+        """Let no single operation make more nodes than this, beside those there are."""
         self._maximum = nodes
-        if self._nodes > nodes:
+        if self._nodes > nodes and len(self) < nodes // 2:
             self._rebuild(nodes, self._slots)
 
     def tend(self) -> None:
-        """Throw away what nobody needs if that is due; if much is left, remember more results from now on."""
+        """Throw away what nobody needs if that is due; if much is left, there is more room from now on.
+
+        Whoever calls this keeps predicates, and no functions: they may be those of a store that is left.
+        """
         made = self._store.approx_num_inner_nodes()
         if made <= self._due:
             return
-        self._restricted = {}
-        self._store.gc()
-        left = self._store.num_inner_nodes()
+        self.collect_garbage()
         if self._is_reordering:
             reorder(self)
-            left = self._store.num_inner_nodes()
-        if self._slots < MAXIMUM_SLOTS and (left > self._slots // 2 or made > 4 * self._due):
-            self._rebuild(max(self._nodes, min(8 * left, self._maximum)), min(MAXIMUM_SLOTS, 8 * self._slots))
+        left = len(self)
+        nodes, slots = self._nodes, self._slots
+        if left > nodes // _NODES_GROW:
+            nodes = max(nodes, min(2 * _NODES_GROW * left, self._maximum))
+        if left > slots // 2 or made > 4 * self._due:
+            slots = min(MAXIMUM_SLOTS, _SLOTS_GROW * slots)
+        if (nodes, slots) != (self._nodes, self._slots):
+            # Where there is no memory for that, what there is may do.
+            with suppress(MemoryError):
+                self._rebuild(nodes, slots)
         self._due = max(self._slots, 3 * left)
 
     def attempt[T](self, work: Callable[[], T]) -> T:
@@ -218,35 +248,49 @@ class OxiddManager:
             DDMemoryError: It needs more nodes than there may be.
             MemoryError: There is no more room.
         """
-        is_larger = False
         while True:
-            self._store.gc()
-            if is_larger or len(self) > self._nodes // 2:
-                if self._nodes >= self._maximum:
-                    raise DDMemoryError("there are more nodes than there may be")
-                self._rebuild(min(8 * self._nodes, self._maximum), min(MAXIMUM_SLOTS, 8 * self._slots))
-            is_larger = True
+            is_last = self._nodes >= self._maximum
+            if is_last and self._is_last_attempt:
+                raise DDMemoryError("there are more nodes than there may be")
+            self.pause()
+            nodes = min(_NODES_GROW * self._nodes, self._maximum)
+            if is_last:
+                # Errors keep predicates in cycles.
+                gc.collect()
+            # A new store in any case: OxiDD's own collector, which may be at work, keeps what it has found for a while.
+            self._rebuild(nodes, min(MAXIMUM_SLOTS, _SLOTS_GROW * self._slots), nodes if is_last else self._nodes + 1)
+            self._is_last_attempt = is_last
             try:
                 return work(*arguments)
             except DDMemoryError:
-                continue
+                if is_last:
+                    raise
+            finally:
+                self._is_last_attempt = False
 
-    def _rebuild(self, nodes: int, slots: int) -> None:
-        """Go on in another store, with all predicates that there are."""
-        order = [self._store.level_to_var(level) for level in range(len(self.names))]
+    def _rebuild(self, nodes: int, slots: int, least: int = 0) -> None:
+        """Go on in another store, with all predicates that there are.
+
+        Raises:
+            DDMemoryError: They do not fit into it.
+            MemoryError: There is no room for it.
+        """
+        old = dict(self.__dict__)
+        order = self.order()
         # Only the garbage collector knows all predicates: to note each of them would take longer than most operations.
         predicates = [item for item in gc.get_referrers(self) if type(item) is Predicate]
-        old = self._store
         try:
-            self._open(nodes, slots)
+            self._open(nodes, slots, max(least, len(self.names) + 2))
+            if not self._is_in_order:
+                self._store.set_var_order([self._numbers[name] for name in order])
+            copy = _Copy(self._store)
+            functions = [copy.of(item.function) for item in predicates]
         except MemoryError:
-            self._store = old
+            self.__dict__.update(old)
             raise
-        self._store.set_var_order(order)
         self.generation += 1
-        copy = _Copy(self._store)
-        for item in predicates:
-            item.function = copy.of(item.function)
+        for item, function in zip(predicates, functions, strict=True):
+            item.function = function
 
     # Order
 
@@ -257,15 +301,36 @@ class OxiddManager:
         return before
 
     def set_order(self, names: Sequence[str]) -> None:
-        """Put variables into an order, topmost first."""
-        self._store.set_var_order([self._numbers[name] for name in names])
-        self._is_in_order = list(names) == self.names
+        """Put variables into an order, topmost first.
+
+        Raises:
+            DDMemoryError: There are more nodes meanwhile than there may be.
+        """
+        for place, name in enumerate(names):
+            if self.order()[place] != name:
+                self.move(name, place)
+
+    def move(self, name: str, place: int) -> None:
+        """Move a variable to a place in the order, and the others aside.
+
+        Raises:
+            DDMemoryError: There are more nodes meanwhile than there may be.
+        """
+        # OxiDD ends the process where it lacks room for this. One variable does not make the diagrams twice as large.
+        while len(self) > self._nodes // _NODES_GROW:
+            if self._nodes >= self._maximum:
+                raise DDMemoryError("there are more nodes than there may be")
+            self._rebuild(min(_NODES_GROW * self._nodes, self._maximum), self._slots, self._nodes + 1)
+        order = [other for other in self.order() if other != name]
+        order.insert(place, name)
+        self._store.set_var_order([self._numbers[item] for item in order])
+        self._is_in_order = order == self.names
         self._masks.clear()
 
     def order(self) -> list[str]:
         """The variables, topmost first."""
         if self._is_in_order:
-            return self.names
+            return list(self.names)
         return [self.names[self._store.level_to_var(level)] for level in range(len(self.names))]
 
     # Variables
@@ -277,11 +342,10 @@ class OxiddManager:
     def declare(self, *names: str) -> None:
         """Add variables below those there are."""
         new = [name for name in dict.fromkeys(names) if name not in self._numbers]
-        for number in self._store.add_named_vars(new):
-            name = self._store.var_name(number)
-            self._numbers[name] = number
-            self.names.append(name)
-            self._variables[name] = self._store.var(number)
+        self._store.add_named_vars(new)
+        self._numbers |= {name: number for number, name in enumerate(new, start=len(self.names))}
+        self.names += new
+        self.attempt(lambda: self._variables.update({name: self._store.var(name) for name in new}))
 
     def var(self, name: str) -> Predicate:
         """The predicate that a variable is true."""
@@ -318,12 +382,15 @@ class OxiddManager:
 
     def cube(self, values: Mapping[str, bool]) -> Predicate:
         """Return the predicate that some variables have some values."""
+        return self.attempt(lambda: Predicate(self, self._cube(values)))
+
+    def _cube(self, values: Mapping[str, bool]) -> BCDDFunction:
         level = self._store.var_to_level
         found = self._store.true()
         for name in sorted(values, key=lambda name: level(self._numbers[name]), reverse=True):
             variable = self._variables[name]
             found = found & (variable if values[name] else ~variable)
-        return Predicate(self, found)
+        return found
 
     def support(self, node: Predicate, among: tuple[str, ...] | None = None) -> set[str]:
         """Return the variables that a predicate depends on.
@@ -361,7 +428,7 @@ class OxiddManager:
         key = tuple(names)
         found = self._cubes.get(key)
         if found is None:
-            found = self._cubes[key] = self.cube(dict.fromkeys(key, True)).function
+            found = self._cubes[key] = self._cube(dict.fromkeys(key, True))
         return found
 
     def exist(self, names: Iterable[str], node: Predicate) -> Predicate:
@@ -411,33 +478,35 @@ def reorder(manager: OxiddManager, levels: Mapping[str, int] | None = None) -> N
     if levels is not None:
         manager.set_order(sorted(levels, key=levels.__getitem__))
         return
-    order = manager.order()
-    for name in tuple(order):
-        best, least = order, len(manager)
-        for place in range(len(order)):
-            others = [other for other in order if other != name]
-            tried = [*others[:place], name, *others[place:]]
-            manager.set_order(tried)
+    moves = 0
+    for name in tuple(manager.order()):
+        manager.pause()
+        best, least = manager.order().index(name), len(manager)
+        for place in range(len(manager.names)):
+            manager.move(name, place)
             if len(manager) < least:
-                best, least = tried, len(manager)
-        manager.set_order(best)
-        order = best
+                best, least = place, len(manager)
+        manager.move(name, best)
+        moves += len(manager.names)
+        if moves > _MOVES:
+            break
 
 
-def _with_room(nodes: int, slots: int) -> int:
-    """Return the number of nodes, at most as many as given, that there is memory for.
+def _with_room(nodes: int, slots: int, least: int, times: int) -> int:
+    """Return the number of nodes, at most as many as given, that there is memory for so many times.
 
     Raises:
-        MemoryError: There is memory for a few at most.
+        MemoryError: There is memory for fewer than the least.
     """
     # OxiDD ends the process where it is refused memory.
     while True:
         try:
-            mmap.mmap(-1, (_NODE_BYTES + _TABLE_BYTES) * nodes + _SLOT_BYTES * slots).close()
+            needed = (_NODE_BYTES + _TABLE_BYTES) * nodes + _SLOT_BYTES * slots + _THREAD_BYTES
+            mmap.mmap(-1, times * needed).close()
             return nodes
         except (OSError, ValueError) as error:
             nodes //= 2
-            if nodes < slots:
+            if nodes < least:
                 raise MemoryError("the decision diagrams were refused memory") from error
 
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from robosc.dd_modules import load_dd
-from robosc.oxidd_diagrams import OxiddManager
 from robosc.errors import NodeLimitError, RoboscError
+from robosc.oxidd_diagrams import DDMemoryError, OxiddManager
 
 ENTRY_POINTS = "robosc.bdd_engines"
 
@@ -22,6 +22,9 @@ _CUDD_BASE_BYTES = 32 * 2**20
 
 _CUDD_NODE_BYTES = 64
 """A node, its place in the unique table and its share of the cache."""
+
+_OXIDD_BASE_NODES = 2**18
+"""Nodes that an operation of OxiDD may make whatever the limit is."""
 
 _SLACK = 4
 """Factor over the limit that one operation may take for what it needs on its way."""
@@ -204,18 +207,20 @@ def node_count_of(manager: Manager) -> int:
 
 @contextmanager
 def limited(manager: Manager, maximum_nodes: int | None) -> Iterator[None]:
-    """Let no single operation of CUDD grow far beyond a number of nodes.
+    """Let no single operation of CUDD and OxiDD grow far beyond a number of nodes.
 
     The plain engine loses count of its nodes when an operation is broken off, so it is only asked between operations.
 
     Raises:
         NodeLimitError: An operation would have grown too far.
-        MemoryError: CUDD was refused memory before that. Mostly it ends the process then, by `exit(1)`.
+        MemoryError: The engine was refused memory before that. Mostly CUDD ends the process then, by `exit(1)`.
     """
     allowed_bytes = _allow(manager, maximum_nodes)
     has_failed = False
     try:
         yield
+    except DDMemoryError:
+        has_failed = True
     except ValueError as error:
         has_failed = _is_of_cudd(error, allowed_bytes)
         if not has_failed:
@@ -233,11 +238,13 @@ def within_limit[T](manager: Manager, maximum_nodes: int | None, work: Callable[
 
     Raises:
         NodeLimitError: An operation would have grown too far.
-        MemoryError: CUDD was refused memory before that.
+        MemoryError: The engine was refused memory before that.
     """
     allowed_bytes = _allow(manager, maximum_nodes)
     try:
         return work()
+    except DDMemoryError:
+        pass
     except ValueError as error:
         if not _is_of_cudd(error, allowed_bytes):
             raise
@@ -245,7 +252,9 @@ def within_limit[T](manager: Manager, maximum_nodes: int | None, work: Callable[
 
 
 def _allow(manager: Manager, maximum_nodes: int | None) -> int | None:
-    """Set and return the bytes that CUDD may have for a number of nodes; None for no limit."""
+    """Set and return the bytes that CUDD may have for a number of nodes; None for no limit, and for other engines."""
+    if maximum_nodes is not None and isinstance(manager, OxiddManager):
+        manager.limit(_OXIDD_BASE_NODES + _SLACK * maximum_nodes)
     if maximum_nodes is None or not is_compiled(manager):
         return None
     allowed_bytes = _CUDD_BASE_BYTES + _SLACK * _CUDD_NODE_BYTES * maximum_nodes
@@ -260,6 +269,8 @@ def _is_of_cudd(error: ValueError, allowed_bytes: int | None) -> bool:
 
 def _failure(manager: Manager, maximum_nodes: int | None, allowed_bytes: int | None) -> NodeLimitError | MemoryError:
     """Return the error for a failed operation: dd does not report CUDD's error code."""
+    if isinstance(manager, OxiddManager):
+        return node_limit_error(maximum_nodes or 0)
     # The tables of the failed operation are already free again.
     if _memory_of(manager) < _NEARLY * (allowed_bytes or 0):
         return MemoryError("the decision diagrams were refused memory")

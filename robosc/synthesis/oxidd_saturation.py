@@ -61,16 +61,19 @@ class OxiddSaturation(Saturation):
         self._replayed = 0
         while True:
             try:
-                self._begin()
-                found = Predicate(self._oxidd, self._of_function(states.function, until and until.function))
+                found = self._oxidd.attempt(lambda: self._of_function(*self._begun(states, until)))
+                found = Predicate(self._oxidd, found)
                 self._monitor.check_stop(self._taken - self._spent)
                 return found
             except _RebuiltError:
-                pass
-            except DDMemoryError:
-                self._oxidd.again(lambda: None)
-            self._replayed, self._taken = max(self._replayed, self._taken), 0
-            self._known.clear()
+                continue
+
+    def _begun(self, states: Predicate, until: Predicate | None) -> tuple[BCDDFunction, BCDDFunction | None]:
+        """Begin, or begin anew: return the functions of predicates."""
+        self._replayed, self._taken = max(self._replayed, self._taken), 0
+        self._known.clear()
+        self._begin()
+        return states.function, until and until.function
 
     def _begin(self) -> None:
         """Take the functions of all predicates."""

@@ -10,17 +10,49 @@ decision diagram framework in Rust", TACAS 2024, LNCS 14572, pp. 255-275.
 """
 
 import gc
+import importlib
 import mmap
 import os
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from typing import Any, Self
+from importlib.util import find_spec, module_from_spec
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, Self
+
+
+def _load() -> ModuleType:
+    """Return OxiDD's extension, loaded without the package around it, which reads the data of its distribution first.
+
+    That takes thirty times as long as the rest. Another program that imports the package gets all of it.
+    """
+    name = "oxidd"
+    if name in sys.modules:
+        return importlib.import_module("oxidd._oxidd")
+    spec = find_spec(name)
+    if spec is None:
+        raise ModuleNotFoundError("the package 'oxidd' is not installed", name=name)
+    sys.modules[name] = module_from_spec(spec)
+    try:
+        return importlib.import_module("oxidd._oxidd")
+    finally:
+        del sys.modules[name]
+
 
 # OxiDD reads this whenever it makes a thread. With one thread all work is done by the caller, on the caller's stack.
 os.environ.setdefault("OXIDD_STACK_SIZE", str(2**18))
 
-from oxidd.bcdd import BCDDFunction, BCDDManager, BCDDSubstitution
-from oxidd.util import BooleanOperator, DDMemoryError
+if TYPE_CHECKING:
+    from oxidd._oxidd import BCDDFunction, BCDDManager, BCDDSubstitution, BooleanOperator, DDMemoryError
+else:
+    _module = _load()
+    BCDDFunction, BCDDManager, BCDDSubstitution, BooleanOperator, DDMemoryError = (
+        _module.BCDDFunction,
+        _module.BCDDManager,
+        _module.BCDDSubstitution,
+        _module.BooleanOperator,
+        _module.DDMemoryError,
+    )
 
 FIRST_NODES = 2**24
 """Nodes that a manager has room for at the beginning: memory is taken only for those that are there.

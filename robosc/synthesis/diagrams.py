@@ -15,7 +15,7 @@ MAXIMUM_BRANCHES = 100_000
 MAXIMUM_TOTAL = 400_000
 """Ranges that all nodes of a diagram together may distinguish."""
 
-MAXIMUM_KEPT = 1_000
+MAXIMUM_KEPT = 100
 """Ranges of a node up to which they are kept: other nodes above it need them again."""
 
 _Runs = tuple[tuple[int, ...], tuple[Any, ...]]
@@ -34,10 +34,7 @@ class _Extractor:
         self._walk = nodes
         self._level, self._split = nodes.level, nodes.split
         self._block_at = {
-            level: number
-            for number, block in enumerate(encoding.levels)
-            for _, levels in block
-            for level in levels
+            level: number for number, block in enumerate(encoding.levels) for _, levels in block for level in levels
         }
         self._maximum = self._left = maximum
         self._nodes: list[DecisionNode] = []
@@ -46,7 +43,7 @@ class _Extractor:
         # The numbers of nodes by themselves, and of those that come from places of the same block.
         self._done = dict(self._constants)
         self._known: dict[tuple[Any, int], int] = {}
-        self._found: dict[tuple[Any, int], _Runs] = {}
+        self._found = nodes.taken_apart
 
     def diagram(self, predicate: Any) -> DecisionDiagram:
         root = self._walk.node(predicate)
@@ -63,7 +60,7 @@ class _Extractor:
             block: The block that it comes from.
             first: Number of places of that block that it does not depend on for certain.
         """
-        own = self._block_at[self._level(node)]
+        own = self._block_at[self._level(node)]  # type: ignore[index]  # it is no constant
         if own != block or not first:
             found = self._done.get(node)
             if found is None:
@@ -123,13 +120,17 @@ class _Extractor:
         found = self._found.get(key)
         if found is not None:
             return found
+        after = place + 1
         if level > at:
             # The bit does not matter: both halves look alike.
-            starts, below = high_starts, high_below = self._runs(subject, levels, node, place + 1)
+            starts, below = high_starts, high_below = self._runs(subject, levels, node, after)
         else:
             high, low = self._split(node) if level == at else self._walk.split_at(node, at)
-            starts, below = self._runs(subject, levels, low, place + 1)
-            high_starts, high_below = self._runs(subject, levels, high, place + 1)
+            if after == len(levels):
+                starts, below, high_starts, high_below = (0,), (low,), (0,), (high,)
+            else:
+                starts, below = self._runs(subject, levels, low, after)
+                high_starts, high_below = self._runs(subject, levels, high, after)
         half = 1 << (len(levels) - place - 1)
         same = 1 if below[-1] == high_below[0] else 0
         found = (*starts, *[half + start for start in high_starts[same:]]), below + high_below[same:]
@@ -138,13 +139,6 @@ class _Extractor:
         if len(found[0]) <= MAXIMUM_KEPT:
             self._found[key] = found
         return found
-
-    def _node(self, subject: Subject, starts: tuple[int, ...], children: tuple[int, ...]) -> int:
-        node = DecisionNode(subject.automaton, subject.variable, starts, children)
-        if node not in self._numbers:
-            self._numbers[node] = len(self._nodes) + 2
-            self._nodes.append(node)
-        return self._numbers[node]
 
 
 def _too_many_branches(subject: Subject) -> UnsupportedModelError:

@@ -8,7 +8,7 @@ is known for certain, and nothing is counted or reported until the work is as fa
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from robosc.oxidd_diagrams import BCDDFunction, BooleanOperator, DDMemoryError, OxiddManager, Predicate
+from robosc.oxidd_diagrams import BCDDFunction, BooleanOperator, OxiddManager, Predicate
 from robosc.synthesis.image import Image
 from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.saturation import PAUSE, Saturation
@@ -42,7 +42,7 @@ class _Made(NamedTuple):
 
 
 class OxiddSaturation(Saturation):
-    """Closure of sets of states under steps all of whose images are `Image`s; the arguments are those of `Saturation`."""
+    """Closure of sets of states under steps whose images are `Image`s; the arguments are those of `Saturation`."""
 
     def __init__(
         self,
@@ -61,8 +61,9 @@ class OxiddSaturation(Saturation):
         self._replayed = 0
         while True:
             try:
-                found = self._oxidd.attempt(lambda: self._of_function(*self._begun(states, until)))
-                found = Predicate(self._oxidd, found)
+                found = Predicate(
+                    self._oxidd, self._oxidd.attempt(lambda: self._of_function(*self._begun(states, until)))
+                )
                 self._monitor.check_stop(self._taken - self._spent)
                 return found
             except _RebuiltError:
@@ -73,7 +74,7 @@ class OxiddSaturation(Saturation):
         self._replayed, self._taken = max(self._replayed, self._taken), 0
         self._known.clear()
         self._begin()
-        return states.function, until and until.function
+        return states.function, None if until is None else until.function
 
     def _begin(self) -> None:
         """Take the functions of all predicates."""
@@ -82,7 +83,8 @@ class OxiddSaturation(Saturation):
             return
         self._generation = manager.generation
         self._at = manager.by_level()
-        self._no = manager.false.function
+        self._no, self._yes = manager.false.function, manager.true.function
+        self._end = len(self._groups)
         self._inside = self._within.function
         self._made = [(top, [_made(manager, step) for step in steps]) for top, steps in self._groups]
 
@@ -102,10 +104,10 @@ class OxiddSaturation(Saturation):
         return until is not None and (until & ~states) == self._no
 
     def _closed(self, states: BCDDFunction, within: BCDDFunction, group: int) -> BCDDFunction:
-        if group == len(self._made) or states == within or states == self._no:
+        if group == self._end or states == within or states == self._no:
             return states
         key = (states, within, group)
-        found = self._known.get(key)
+        found: BCDDFunction | None = self._known.get(key)
         if found is not None:
             return found
         top, steps = self._made[group]
@@ -113,8 +115,8 @@ class OxiddSaturation(Saturation):
         if level is None or (other is not None and other < level):
             level = other
         if level is not None and level < top:
-            high, low = states.cofactors() if states.node_level() == level else (states, states)
-            high_inside, low_inside = within.cofactors() if other == level else (within, within)
+            high, low = (states.node_level() == level and states.cofactors()) or (states, states)
+            high_inside, low_inside = (other == level and within.cofactors()) or (within, within)
             low = self._closed(low, low_inside, group)
             found = self._at[level].ite(self._closed(high, high_inside, group), low)
         else:
@@ -122,44 +124,43 @@ class OxiddSaturation(Saturation):
         self._known[key] = found
         return found
 
-    def _repeated(
-        self, states: BCDDFunction, within: BCDDFunction, group: int, steps: Sequence[_Made]
-    ) -> BCDDFunction:
-        seen = [self._no] * len(steps)
-        vain, number = 0, 0
-        while vain < len(steps):
-            grown = self._more(states, within, steps[number], states & ~seen[number])
-            seen[number] = states
-            number = (number + 1) % len(steps)
+    def _repeated(self, states: BCDDFunction, within: BCDDFunction, group: int, steps: Sequence[_Made]) -> BCDDFunction:
+        unseen = [self._yes] * len(steps)
+        vain, number, count = 0, 0, len(steps)
+        while vain < count:
+            grown = self._more(states, within, steps[number], states & unseen[number])
+            unseen[number] = ~states
+            number = (number + 1) % count
             vain += 1
             if grown != states:
                 states = self._closed(grown, within, group + 1)
                 vain = 0
         return states
 
-    def _more(
-        self, states: BCDDFunction, within: BCDDFunction, step: _Made, new: BCDDFunction
-    ) -> BCDDFunction:
+    def _more(self, states: BCDDFunction, within: BCDDFunction, step: _Made, new: BCDDFunction) -> BCDDFunction:
         self._counted(states, new)
-        if new == self._no:
+        no = self._no
+        if new == no:
             return states
-        if step.room is not None and (within & step.room & ~states) == self._no:
+        inside, needed, fixed, moved, relation, hidden, called, outside, room = step
+        if room is not None and (within & room & ~states) == no:
             return states
-        found = new
-        if step.inside is not None:
-            found = found & step.inside
-        if step.fixed is not None:
-            found = found.apply_exists(_AND, step.needed, step.fixed)
-        if found == self._no:
+        if inside is not None:
+            new = new & inside
+        if needed is not None and fixed is not None:
+            new = new.apply_exists(_AND, needed, fixed)
+            if new == no:
+                return states
+        if moved is not None:
+            new = new.substitute(moved)
+        new = new & relation if hidden is None else new.apply_exists(_AND, relation, hidden)
+        if new == no:
             return states
-        if step.moved is not None:
-            found = found.substitute(step.moved)
-        found = found & step.relation if step.hidden is None else found.apply_exists(_AND, step.relation, step.hidden)
-        if step.called is not None:
-            found = found.substitute(step.called)
-        if step.outside is not None:
-            found = found & step.outside
-        return states | (within & found)
+        if called is not None:
+            new = new.substitute(called)
+        if outside is not None:
+            new = new & outside
+        return states | (within & new)
 
     def _counted(self, states: BCDDFunction, new: BCDDFunction) -> None:
         if self._taken >= self._replayed:
@@ -176,20 +177,28 @@ class OxiddSaturation(Saturation):
 
 
 def _made(manager: OxiddManager, step: Step) -> _Made:
-    image = step.add
-    assert isinstance(image, Image)
+    image: Image = step.add  # type: ignore[assignment]  # closure_under has looked
 
     def function(predicate: Any) -> BCDDFunction | None:
         return None if predicate is None else predicate.function
 
+    inside, needed, outside = map(function, (image.inside, image.needed, image.outside))
+    relation: BCDDFunction = image.relation.function
+    # What is conjoined next anyway is conjoined once for all sets of states.
+    if inside is not None and needed is not None:
+        inside, needed = None, needed & inside
+    elif inside is not None and not image.functions:
+        inside, relation = None, relation & inside
+    if outside is not None and not image.names and not image.hidden:
+        outside, relation = None, relation & outside
     return _Made(
-        inside=function(image.inside),
-        needed=function(image.needed),
+        inside=inside,
+        needed=needed if image.constants else None,
         fixed=manager.variables(image.constants) if image.constants else None,
         moved=manager.substitution(image.functions) if image.functions else None,
-        relation=image.relation.function,
+        relation=relation,
         hidden=manager.variables(image.hidden) if image.hidden else None,
         called=manager.substitution(image.names) if image.names else None,
-        outside=function(image.outside),
+        outside=outside,
         room=function(step.room),
     )

@@ -16,29 +16,35 @@ class Nodes(Protocol):
     """Nodes of one manager.
 
     Attributes:
-        node: Return the node of a predicate.
-        level: Return the level of a node, or None for a constant.
-        split: Return what is below a node that is no constant: where its variable is true, and where it is false.
-        either: Return the node that is true where one of two is.
         restricted: What has been found for nodes restricted to others.
+        taken_apart: What has been found for nodes by the values of a place of the state: see `diagrams`.
     """
 
     true: Any
     false: Any
-    node: Callable[[Any], Any]
-    level: Callable[[Any], int | None]
-    split: Callable[[Any], tuple[Any, Any]]
-    either: Callable[[Any, Any], Any]
     restricted: dict[tuple[Any, Any], Any]
+    taken_apart: dict[tuple[Any, int], tuple[tuple[int, ...], tuple[Any, ...]]]
 
-    def split_at(self, node: Any, level: int) -> tuple[Any, Any]:
+    def node(self, predicate: Any, /) -> Any:
+        """Return the node of a predicate."""
+
+    def predicate(self, node: Any, /) -> Any:
+        """Return the predicate of a node."""
+
+    def level(self, node: Any, /) -> int | None:
+        """Return the level of a node, or None for a constant."""
+
+    def split(self, node: Any, /) -> Any:
+        """Return what is below a node that is no constant: where its variable is true, and where it is false."""
+
+    def split_at(self, node: Any, level: int, /) -> tuple[Any, Any]:
         """Return what is left of a node where the variable of a level, not above it, is true, and where it is false."""
 
-    def joined(self, level: int, high: Any, low: Any) -> Any:
-        """Return the node that tests the variable of a level, above two nodes."""
+    def either(self, one: Any, other: Any, /) -> Any:
+        """Return the node that is true where one of two is."""
 
-    def predicate(self, node: Any) -> Any:
-        """Return the predicate of a node."""
+    def joined(self, level: int, high: Any, low: Any, /) -> Any:
+        """Return the node that tests the variable of a level, above two nodes."""
 
 
 class OxiddNodes:
@@ -48,16 +54,18 @@ class OxiddNodes:
         manager: The manager.
     """
 
-    node = attrgetter("function")
+    node = staticmethod(attrgetter("function"))
     level = staticmethod(BCDDFunction.node_level)
     split = staticmethod(BCDDFunction.cofactors)
-    either = or_
+    either = staticmethod(or_)
 
     def __init__(self, manager: OxiddManager) -> None:
         self._manager = manager
         self.true = manager.true.function
         self.false = manager.false.function
-        self.restricted = manager.restricted()
+        # The conditions of one system are alike in part.
+        self.restricted = manager.kept("restricted")
+        self.taken_apart = manager.kept("taken apart")
         self._variables = manager.by_level()
 
     def split_at(self, node: Any, level: int) -> tuple[Any, Any]:
@@ -82,13 +90,14 @@ class DdNodes:
         manager: The manager.
     """
 
-    either = or_
+    either = staticmethod(or_)
 
     def __init__(self, manager: Manager) -> None:
         self._manager = manager
         self.true = manager.true
         self.false = manager.false
-        self.restricted = {}
+        self.restricted: dict[tuple[Any, Any], Any] = {}
+        self.taken_apart: dict[tuple[Any, int], tuple[tuple[int, ...], tuple[Any, ...]]] = {}
         self._names: dict[int, str] = {}
 
     @staticmethod
@@ -111,7 +120,7 @@ class DdNodes:
 
     def split_at(self, node: Any, level: int) -> tuple[Any, Any]:
         """Return what is left of a node where the variable of a level is true, and where it is false."""
-        name = self._manager.var_at_level(level)
+        name = self._manager.var_at_level(level)  # type: ignore[attr-defined]  # every manager of dd has it
         return self._manager.let({name: True}, node), self._manager.let({name: False}, node)
 
     def joined(self, level: int, high: Any, low: Any) -> Any:

@@ -62,7 +62,10 @@ def test_predicates_stay_what_they_are_while_their_manager_grows(one: int, other
     manager.declare(*NAMES)
     manager.set_order(order)
     a, b = _function(manager, NAMES, one), _function(manager, NAMES, other)
-    values = [bool(one >> place & 1) for place in reversed(range(256))], [bool(other >> place & 1) for place in reversed(range(256))]
+    values = (
+        [bool(one >> place & 1) for place in reversed(range(256))],
+        [bool(other >> place & 1) for place in reversed(range(256))],
+    )
     assert manager.generation or a.dag_size < 32
     assert (_table(manager, a), _table(manager, b)) == values
     assert manager.order() == order

@@ -60,7 +60,8 @@ def test_what_always_holds_counts_as_a_requirement() -> None:
 
 def test_the_same_bundle_gives_the_same_bytes() -> None:
     outcome = [
-        make_supervisor(example_bundle("navigation/navigation"), engine=engine) for engine in ("cudd", "oxidd", "autoref")
+        make_supervisor(example_bundle("navigation/navigation"), engine=engine)
+        for engine in ("cudd", "oxidd", "autoref")
     ]
     contents = {encode(item.supervisor) for item in outcome if item.supervisor}
     assert len(contents) == 1

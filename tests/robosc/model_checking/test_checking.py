@@ -79,9 +79,7 @@ def test_all_engines_give_the_same(seed: int) -> None:
     random = Random(seed)
     claims = [claim(random_formula(drawn, random)) for _ in range(FORMULAS)]
     added = supervised(drawn)
-    first, *others = (
-        verify_properties(drawn, added, claims, engine=engine) for engine in ("cudd", "oxidd", "autoref")
-    )
+    first, *others = (verify_properties(drawn, added, claims, engine=engine) for engine in ("cudd", "oxidd", "autoref"))
     assert others == [first, first]
 
 

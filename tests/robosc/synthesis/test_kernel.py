@@ -18,7 +18,7 @@ from robosc import kernel
 from robosc.dd_modules import load_dd
 from robosc.errors import NodeLimitError, SynthesisCancelled
 from robosc.kernel import kernel_module, kernel_problem
-from robosc.synthesis import EngineOptions, SynthesisProgress, compiled, connection, nodes, synthesize
+from robosc.synthesis import EngineOptions, SynthesisProgress, connection, nodes, synthesize
 from robosc.synthesis.compiled import kernel_of
 from robosc.synthesis.engines import Manager, limited, make_manager
 from robosc.synthesis.image import Image

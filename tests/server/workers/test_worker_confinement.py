@@ -342,7 +342,9 @@ def expected(name: str, arguments: list[int]) -> bool:
 
 
 ARGUMENT = st.one_of(
-    st.sampled_from([0x3D0F00, 0, 1, 2, 3, 4, 5, 7, 8, 9, 0x20, 0x22, 0o100, 0o1000, 0o10000000, 1030, OWN_PID, -1, 1 << 32]),
+    st.sampled_from(
+        [0x3D0F00, 0, 1, 2, 3, 4, 5, 7, 8, 9, 0x20, 0x22, 0o100, 0o1000, 0o10000000, 1030, OWN_PID, -1, 1 << 32]
+    ),
     st.integers(-(2**63), 2**63 - 1),
 )
 

@@ -182,15 +182,18 @@ def _made(manager: OxiddManager, step: Step) -> _Made:
     def function(predicate: Any) -> BCDDFunction | None:
         return None if predicate is None else predicate.function
 
-    inside, needed, outside = map(function, (image.inside, image.needed, image.outside))
+    inside, needed, outside = function(image.inside), function(image.needed), function(image.outside)
     relation: BCDDFunction = image.relation.function
     # What is conjoined next anyway is conjoined once for all sets of states.
     if inside is not None and needed is not None:
-        inside, needed = None, needed & inside
+        needed = needed & inside
+        inside = None
     elif inside is not None and not image.functions:
-        inside, relation = None, relation & inside
+        relation = relation & inside
+        inside = None
     if outside is not None and not image.names and not image.hidden:
-        outside, relation = None, relation & outside
+        relation = relation & outside
+        outside = None
     return _Made(
         inside=inside,
         needed=needed if image.constants else None,

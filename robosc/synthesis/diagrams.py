@@ -1,5 +1,6 @@
 """Predicates over bits as decision diagrams over locations and variables."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from robosc.automata.state import Subject
@@ -14,6 +15,9 @@ MAXIMUM_BRANCHES = 100_000
 
 MAXIMUM_TOTAL = 400_000
 """Ranges that all nodes of a diagram together may distinguish."""
+
+FEW_BITS = 5
+"""Bits of a place that are few."""
 
 MAXIMUM_KEPT = 100
 """Ranges of a node up to which they are kept: other nodes above it need them again."""
@@ -77,7 +81,7 @@ class _Extractor:
         known = self._done if len(places) == 1 else self._constants
         for number in range(first, len(places)):
             subject, (size, levels) = subjects[number], places[number]
-            runs, below = self._runs(subject, levels, node, 0)
+            runs, below = self._ranges(subject, levels, node)
             if len(runs) == 1:
                 continue
             self._left -= len(runs)
@@ -109,6 +113,33 @@ class _Extractor:
             found = self._numbers[node] = len(self._nodes) + 2
             self._nodes.append(node)
         return found
+
+    def _ranges(self, subject: Subject, levels: tuple[int, ...], node: Any) -> tuple[Sequence[int], Sequence[Any]]:
+        """Return the cofactor of a predicate for each index of the bits of a place, equal neighbours merged."""
+        if len(levels) > FEW_BITS:
+            return self._runs(subject, levels, node, 0)
+        starts: list[int] = []
+        below: list[Any] = []
+        self._collect(levels, node, 0, 0, starts, below)
+        return starts, below
+
+    def _collect(
+        self, levels: tuple[int, ...], node: Any, place: int, start: int, starts: list[int], below: list[Any]
+    ) -> None:
+        """Add what `_runs` returns, for bits so few that nothing is gained by remembering it."""
+        level = self._level(node)
+        if level is None or place == len(levels) or level > levels[-1]:
+            if not below or below[-1] != node:
+                starts.append(start)
+                below.append(node)
+            return
+        at = levels[place]
+        if level == at:
+            high, low = self._split(node)
+        else:
+            high, low = (node, node) if level > at else self._walk.split_at(node, at)
+        self._collect(levels, low, place + 1, start, starts, below)
+        self._collect(levels, high, place + 1, start + (1 << (len(levels) - place - 1)), starts, below)
 
     def _runs(self, subject: Subject, levels: tuple[int, ...], node: Any, place: int) -> _Runs:
         """Return the cofactor of a predicate for each index of the bits from `place` on, equal neighbours merged."""

@@ -130,9 +130,10 @@ def add_engine_argument(parser: argparse.ArgumentParser) -> None:
         "--engine",
         default="auto",
         metavar="NAME",
-        help="engine for decision diagrams: cudd, autoref (plain Python), or auto: the fastest installed (the default)",
+        help="engine for decision diagrams: cudd (in C), oxidd (in Rust), autoref (plain Python), or auto: the fastest "
+        "installed (the default)",
     )
-    suggest(engine, lambda: ("auto", "cudd", "autoref"))
+    suggest(engine, lambda: ("auto", "cudd", "oxidd", "autoref"))
 
 
 def add_engine_options(parser: argparse.ArgumentParser) -> None:

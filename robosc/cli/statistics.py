@@ -47,7 +47,7 @@ class Figures(msgspec.Struct, frozen=True):
 
     def _kernel(self) -> str:
         """Return the part that the kernel had in work on the diagrams."""
-        from robosc.synthesis.compiled import left_aside
+        from robosc.synthesis.connection import left_aside
 
         if self.statistics is not None and self.statistics.engine != "cudd":
             return "not used: it is for the engine cudd"

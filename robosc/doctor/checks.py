@@ -9,7 +9,7 @@ from robosc.dd_modules import has_cudd
 from robosc.doctor.machine import Machine
 from robosc.interfaces import CODENAMES, DISTRIBUTIONS
 from robosc.python_versions import FIX, unsupported
-from robosc.synthesis.compiled import left_aside
+from robosc.synthesis.connection import left_aside
 
 _IMPORT_S = 30.0
 _SERVER_S = 20.0
@@ -142,12 +142,7 @@ def _packages(machine: Machine, needed: frozenset[Purpose], *, all_parts: bool) 
         yield Finding("decision diagrams", Grade.OK, "the engine in C (cudd)")
         yield _kernel()
     else:
-        yield Finding(
-            "decision diagrams",
-            Grade.NOTE,
-            "only the engine in plain Python, which is slow",
-            "pip install --only-binary dd dd, where there is a wheel for this system",
-        )
+        yield Finding("decision diagrams", Grade.OK, "the engine in Rust (oxidd); dd comes without the one in C here")
     wanted = {_EXTRAS[purpose] for purpose in needed if purpose in _EXTRAS}
     for extra in _TOLD_EXTRAS:
         if all_parts or extra in wanted:
@@ -162,7 +157,10 @@ def _kernel() -> Finding:
     if not problem:
         return Finding("kernel", Grade.OK, "the inner loops of synthesis are in C")
     return Finding(
-        "kernel", Grade.NOTE, f"synthesis does without it, which is slower: {problem}", "docs/install.md, 'The kernel'"
+        "kernel",
+        Grade.NOTE,
+        f"synthesis takes the engine oxidd, and conditions take longer: {problem}",
+        "docs/install.md, 'The kernel'",
     )
 
 

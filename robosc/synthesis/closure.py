@@ -8,12 +8,15 @@ level of the diagrams, so the variable order must not change.
 from collections.abc import Iterable
 from typing import Any
 
+from robosc.oxidd_diagrams import OxiddManager
 from robosc.synthesis.chaining import Chaining
 from robosc.synthesis.compiled import kernel_of
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import Manager
 from robosc.synthesis.engines import is_reordering as may_reorder
+from robosc.synthesis.image import Image
 from robosc.synthesis.monitor import ProgressMonitor
+from robosc.synthesis.oxidd_saturation import OxiddSaturation
 from robosc.synthesis.result import Closure
 from robosc.synthesis.saturation import CompiledSaturation, Saturation, saturation
 from robosc.synthesis.step import Step
@@ -33,7 +36,10 @@ def closure_under(
     levels = {name: level for level, name in enumerate(encoding.order)}
     if may_reorder(encoding.manager):
         return Chaining(levels, tuple(steps), within, monitor)
-    return saturation(encoding.manager, levels, tuple(steps), within, monitor)
+    manager, steps = encoding.manager, tuple(steps)
+    if isinstance(manager, OxiddManager) and all(isinstance(step.add, Image) for step in steps):
+        return OxiddSaturation(manager, levels, steps, within, monitor)
+    return saturation(manager, levels, steps, within, monitor)
 
 
 def closure_in(manager: Manager, *, is_reordering: bool) -> Closure:

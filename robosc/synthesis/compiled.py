@@ -1,14 +1,12 @@
 """The kernel's functions for predicates, on the diagrams of CUDD inside dd."""
 
 from collections.abc import Callable, Sequence
-from functools import cache
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from robosc.dd_modules import load_dd
-from robosc.kernel import kernel_module, kernel_problem
+from robosc.synthesis.connection import connected
 from robosc.synthesis.engines import Manager, is_compiled
-from robosc.synthesis.layout import NODE_OFFSET, address_of, layout_problem
+from robosc.synthesis.layout import NODE_OFFSET, address_of
 
 TOTAL = 2
 """Reason for which a predicate is not taken apart: more ranges in all than there may be."""
@@ -30,29 +28,8 @@ class Extracted(NamedTuple):
 
 def kernel_of(manager: Manager) -> "Kernel | None":
     """Return the kernel for a manager, or None where only Python can work with it."""
-    module = _connected()[0] if is_compiled(manager) else None
+    module = connected()[0] if is_compiled(manager) else None
     return None if module is None else Kernel(module, manager)
-
-
-def left_aside() -> str:
-    """Return the reason why the kernel leaves diagrams of CUDD to Python; empty if it does not."""
-    return _connected()[1]
-
-
-@cache
-def _connected() -> tuple[ModuleType | None, str]:
-    """Return the kernel with the CUDD inside dd; None and the reason where there is none, or another dd."""
-    module = kernel_module()
-    if module is None:
-        return None, kernel_problem()
-    try:
-        cudd = load_dd("cudd")
-        module.connect(cudd.__file__)
-    except ImportError as error:
-        # It is not there, or this build of dd keeps the functions of CUDD to itself.
-        return None, str(error)
-    problem = layout_problem(module, cudd)
-    return (None, problem) if problem else (module, "")
 
 
 class Kernel:

@@ -10,8 +10,10 @@ from functools import cache
 from typing import Any
 
 from robosc.dd_modules import load_dd
+from robosc.oxidd_diagrams import OxiddManager, Predicate
 from robosc.synthesis.compiled import kernel_of
 from robosc.synthesis.engines import Manager, is_compiled, is_reordering
+from robosc.synthesis.walks import Nodes, walked
 
 _SMALL = 100
 """Nodes up to which a predicate is small."""
@@ -19,6 +21,8 @@ _SMALL = 100
 
 def cofactors(node: Any) -> tuple[Any, Any]:
     """The predicates where a node's variable is false and true: a complemented edge complements both."""
+    if isinstance(node, Predicate):
+        return node.cofactors
     return (~node.low, ~node.high) if node.negated else (node.low, node.high)
 
 
@@ -29,6 +33,8 @@ def is_constant(manager: Manager, node: Any) -> bool:
 
 def implies(manager: Manager, node: Any, other: Any) -> bool:
     """Return True if a predicate is true only where another one is; CUDD makes no node for that."""
+    if isinstance(manager, OxiddManager):
+        return manager.implies(node, other)
     kernel = kernel_of(manager)
     return bool(node & ~other == manager.false) if kernel is None else kernel.implies(node, other)
 
@@ -45,6 +51,8 @@ def met(manager: Manager, names: Sequence[str], node: Any, other: Any) -> Any:
     """
     if not names:
         return node & other
+    if isinstance(manager, OxiddManager):
+        return manager.and_exist(names, node, other)
     if is_compiled(manager):
         return _and_exists()(node, other, names)
     return manager.exist(names, node & other)
@@ -80,7 +88,7 @@ def renamed(manager: Manager, names: Mapping[str, str], node: Any) -> Any:
     """
     if not names:
         return node
-    if is_compiled(manager) or is_reordering(manager):
+    if is_compiled(manager) or is_reordering(manager) or isinstance(manager, OxiddManager):
         return manager.let(names, node)
     return _Renaming(manager, names).walk(node)
 
@@ -90,17 +98,17 @@ class _Renaming:
         self._manager = manager
         self._new = {name: manager.var(new) for name, new in names.items()}
         self._deepest = max(manager.var(name).level for name in names)
-        self._known: dict[int, Any] = {}
+        self._known: dict[Any, Any] = {}
 
     def walk(self, node: Any) -> Any:
         if is_constant(self._manager, node) or node.level > self._deepest:
             return node
-        found = self._known.get(int(node))
+        found = self._known.get(node)
         if found is None:
             low, high = cofactors(node)
             variable = self._new.get(node.var)
             test = self._manager.var(node.var) if variable is None else variable
-            found = self._known[int(node)] = self._manager.ite(test, self.walk(high), self.walk(low))
+            found = self._known[node] = self._manager.ite(test, self.walk(high), self.walk(low))
         return found
 
 
@@ -112,35 +120,47 @@ def count_models(manager: Manager, node: Any, variables: Sequence[str]) -> int:
         node: A predicate over some of the variables.
         variables: In the manager's order.
     """
-    counter = _Counter(manager, variables)
-    return counter.from_node(node) << counter.place(node)
+    places = {manager.var(name).level: place for place, name in enumerate(variables)}
+
+    def count(nodes: Nodes) -> int:
+        counter = _Counter(nodes, places)
+        root = nodes.node(node)
+        return counter.from_node(root) << counter.place(root)
+
+    return walked(manager, count)
 
 
 # Classes rather than functions in functions: two closures that call each other are a cycle that only the garbage
 # collector ends, and it may take CUDD's manager away before the nodes that the cycle holds.
 class _Counter:
-    def __init__(self, manager: Manager, variables: Sequence[str]) -> None:
-        self._manager = manager
-        self._position = {name: place for place, name in enumerate(variables)}
-        self._known: dict[int, tuple[Any, int]] = {}
+    def __init__(self, nodes: Nodes, places: Mapping[int, int]) -> None:
+        self._nodes = nodes
+        self._places = places
+        self._known: dict[Any, int] = {}
 
     def place(self, node: Any) -> int:
         """Return the number of variables that stand before a node's own."""
-        return len(self._position) if is_constant(self._manager, node) else self._position[node.var]
+        level = self._nodes.level(node)
+        return len(self._places) if level is None else self._places[level]
 
     def from_node(self, node: Any) -> int:
         """Assignments of the variables from the node's own on."""
-        if is_constant(self._manager, node):
-            return int(node == self._manager.true)
-        found = self._known.get(int(node))
+        level = self._nodes.level(node)
+        if level is None:
+            return int(node == self._nodes.true)
+        found = self._known.get(node)
         if found is None:
-            here = self.place(node) + 1
-            low, high = cofactors(node)
-            total = self.from_node(low) << (self.place(low) - here)
-            total += self.from_node(high) << (self.place(high) - here)
-            # The node is kept with its count: its number could otherwise be given to another one.
-            found = self._known[int(node)] = (node, total)
-        return found[1]
+            here = self._places[level] + 1
+            high, low = self._nodes.split(node)
+            found = self.from_node(low) << (self.place(low) - here)
+            found += self.from_node(high) << (self.place(high) - here)
+            self._known[node] = found
+        return found
+
+
+def support_among(manager: Manager, names: tuple[str, ...], node: Any) -> set[str]:
+    """Return the variables that a predicate depends on, which are some of those given."""
+    return manager.support(node, names) if isinstance(manager, OxiddManager) else manager.support(node)
 
 
 def nodes_made(known: Any, *found: Any) -> int:
@@ -175,6 +195,8 @@ def without(manager: Manager, states: Any, cubes: Sequence[Any]) -> Any:
     kernel = kernel_of(manager)
     if kernel is not None:
         return kernel.without(states, cubes)
+    if isinstance(manager, OxiddManager):
+        return manager.without(states, cubes)
     names = [name for cube in cubes for name in manager.support(cube)]
     return manager.exist(names, states) if names else states
 
@@ -203,34 +225,39 @@ def separated(manager: Manager, one: Any, other: Any, cubes: Sequence[Any]) -> t
 def restrict(manager: Manager, node: Any, care: Any) -> Any:
     """A predicate that equals `node` wherever `care` is true, mostly a smaller one."""
     kernel = kernel_of(manager)
-    return _Restrict(manager).walk(node, care) if kernel is None else kernel.restrict(node, care)
+    if kernel is not None:
+        return kernel.restrict(node, care)
+    return walked(manager, lambda nodes: nodes.predicate(_Restrict(nodes).walk(nodes.node(node), nodes.node(care))))
 
 
 class _Restrict:
-    def __init__(self, manager: Manager) -> None:
-        self._manager = manager
-        self._constants = {int(manager.true), int(manager.false)}
-        self._known: dict[tuple[int, int], tuple[Any, Any, Any]] = {}
+    def __init__(self, nodes: Nodes) -> None:
+        self._nodes = nodes
+        self._level, self._split, self._false = nodes.level, nodes.split, nodes.false
+        self._known = nodes.restricted
 
     def walk(self, f: Any, c: Any) -> Any:
-        key = (int(f), int(c))
-        found = self._known.get(key)
-        if found is None:
-            if not self._constants.isdisjoint(key):
+        while True:
+            key = (f, c)
+            found = self._known.get(key)
+            if found is not None:
+                return found
+            here, level = self._level(f), self._level(c)
+            if here is None or level is None:
                 return f
-            found = self._known[key] = (f, c, self._step(f, c))
-        return found[2]
-
-    def _step(self, f: Any, c: Any) -> Any:
-        low_c, high_c = cofactors(c)
-        here, level = f.level, c.level
-        if level < here:
-            return self.walk(f, low_c | high_c)
-        low_f, high_f = cofactors(f)
-        if here < level:
-            return self._manager.ite(self._manager.var(f.var), self.walk(high_f, c), self.walk(low_f, c))
-        if low_c == self._manager.false:
-            return self.walk(high_f, high_c)
-        if high_c == self._manager.false:
-            return self.walk(low_f, low_c)
-        return self._manager.ite(self._manager.var(f.var), self.walk(high_f, high_c), self.walk(low_f, low_c))
+            if level < here:
+                c = self._nodes.either(*self._split(c))
+                continue
+            high_f, low_f = self._split(f)
+            if level > here:
+                high_c = low_c = c
+            else:
+                high_c, low_c = self._split(c)
+                if low_c == self._false:
+                    f, c = high_f, high_c
+                    continue
+                if high_c == self._false:
+                    f, c = low_f, low_c
+                    continue
+            found = self._known[key] = self._nodes.joined(here, self.walk(high_f, high_c), self.walk(low_f, low_c))
+            return found

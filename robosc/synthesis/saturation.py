@@ -84,7 +84,7 @@ class Saturation:
         self._groups = _grouped(levels, steps)
         self._count = sum(len(group) for _, group in self._groups)
         allow_depth(len(levels) + len(self._groups), _FRAMES_PER_LEVEL)
-        self._known: dict[tuple[int, int, int], tuple[Any, Any, Any]] = {}
+        self._known: dict[tuple[Any, Any, int], Any] = {}
         self._phase = ""
         self._taken = self._reports = self._spent = self._next = self._made = 0
 
@@ -123,12 +123,11 @@ class Saturation:
         """Part of a set closed under the groups of steps from one on; `within` is the part that belongs to it."""
         if group == len(self._groups) or states == within or states == self._false:
             return states
-        key = (int(states), int(within), group)
+        key = (states, within, group)
         found = self._known.get(key)
         if found is None:
-            # The nodes are kept with what was found: their numbers could otherwise be given to others.
-            found = self._known[key] = (states, within, self._worked_out(states, within, group))
-        return found[2]
+            found = self._known[key] = self._worked_out(states, within, group)
+        return found
 
     def _worked_out(self, states: Any, within: Any, group: int) -> Any:
         top, steps = self._groups[group]

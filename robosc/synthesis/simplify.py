@@ -31,7 +31,7 @@ from robosc.supervisor.diagram import Subject as Place
 from robosc.supervisor.diagram import diagram_domains
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.encoding import Encoding
-from robosc.synthesis.nodes import implies, restrict, separated, without
+from robosc.synthesis.nodes import implies, restrict, separated, support_among, without
 
 MAXIMUM_NODES = 20_000
 """Nodes of what matters up to which more than restricting is tried."""
@@ -85,7 +85,7 @@ class Simplifier:
         }
         self._variables = encoding.all_of(map(self._manager.var, reversed(encoding.state_names)))
         self._formulas = Formulas(self._domains)
-        self._separating: dict[tuple[int, int], tuple[Any, Any, tuple[DecisionDiagram, ...]]] = {}
+        self._separating: dict[tuple[Any, Any], tuple[DecisionDiagram, ...]] = {}
         self._vain = 0
         self._end = None if seconds is None else monotonic() + seconds
         self._more, self._left = Effort(TOTAL_STEPS), MAXIMUM_EFFORT
@@ -211,7 +211,8 @@ class Simplifier:
 
     def _places(self, *predicates: Any) -> set[Subject]:
         """The places that predicates depend on."""
-        return {self._home[name] for item in predicates for name in self._manager.support(item)}
+        names = self._encoding.state_names
+        return {self._home[name] for item in predicates for name in support_among(self._manager, names, item)}
 
     def _over(self, places: set[Subject], wanted: Any, care: Any) -> tuple[Any, Any]:
         """The values that some places have in the states that matter, where a condition is true and where not."""
@@ -223,12 +224,11 @@ class Simplifier:
 
     def _conditions_between(self, positive: Any, negative: Any) -> Sequence[DecisionDiagram]:
         """Conditions that are true in the positive states and false in the negative ones."""
-        # Many events of one system need the same conditions. The sets are kept with the conditions: the engine could
-        # otherwise give their numbers to other nodes.
-        key = int(positive), int(negative)
+        # Many events of one system need the same conditions.
+        key = positive, negative
         if key not in self._separating:
-            self._separating[key] = positive, negative, tuple(self._new_conditions(positive, negative))
-        return self._separating[key][2]
+            self._separating[key] = tuple(self._new_conditions(positive, negative))
+        return self._separating[key]
 
     def _new_conditions(self, positive: Any, negative: Any) -> Iterator[DecisionDiagram]:
         try:

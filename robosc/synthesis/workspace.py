@@ -8,6 +8,7 @@ import msgspec
 from robosc.automata.state import Subject
 from robosc.automata.structure import System
 from robosc.expressions import Expression
+from robosc.oxidd_diagrams import OxiddManager
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import (
     EngineOptions,
@@ -92,6 +93,8 @@ class Workspaces:
             order: Order of its places; None for the best.
         """
         manager = make_manager(self._engine)
+        if isinstance(manager, OxiddManager):
+            manager.pause = lambda: monitor.check_stop(0)
         encoding = Encoding(system, manager, monitor.check_stop, conditions, followed, order)
         self._managers.append(manager)
         return Workspace(self._engine, encoding, monitor, self.options.is_reordering, self.options.condition_seconds)

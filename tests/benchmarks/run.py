@@ -3,6 +3,7 @@
 Usage: run.py [NAME...]                       (all of them without an argument; a wrong name lists them)
        run.py cif DIR [--against FILE]    (a folder of CIF models: see cif.py)
        run.py families DIR                (a folder of CIF models in shuffled orders: see families.py)
+       run.py engines DIR                 (a folder of CIF models, whole processes by engine: see engines.py)
 """
 
 import sys
@@ -27,6 +28,7 @@ import cif
 import cold_start
 import conditions
 import editor
+import engines
 import execution
 import execution.large_cycles
 import families
@@ -44,6 +46,7 @@ _MODULES = (
         cold_start,
         conditions,
         editor,
+        engines,
         execution,
         execution.large_cycles,
         families,
@@ -69,9 +72,10 @@ def main() -> int:
     if sys.argv[1:2] == ["cif"]:
         sys.stdout.write(cif.table(sys.argv[2:]) + "\n")
         return 0
-    if sys.argv[1:2] == ["families"] and sys.argv[2:]:
-        sys.stdout.write(families.table(sys.argv[2:]) + "\n")
-        return 0
+    for name, module in (("families", families), ("engines", engines)):
+        if sys.argv[1:2] == [name] and sys.argv[2:]:
+            sys.stdout.write(module.table(sys.argv[2:]) + "\n")
+            return 0
     names = sys.argv[1:] or list(TABLES)
     unknown = [name for name in names if name not in TABLES]
     if unknown:

@@ -19,7 +19,7 @@ from support.models import model_of
 
 type Graph = dict[str, dict[str, str]]
 
-ENGINES = ("cudd", "autoref")
+ENGINES = ("cudd", "oxidd", "autoref")
 CONTROLLER, LAYER = Deployment.CONTROLLER, Deployment.LAYER
 
 

@@ -12,7 +12,7 @@ interrupt A         has the kernel send a signal to process A when something com
 trace A             traces the process A
 limit A             changes the limits of process A
 fork                starts a process
-thread              starts a thread
+thread              makes a socket in a thread
 program             becomes another program
 stay                asks not to be ended with its parent
 session             leaves its session
@@ -61,8 +61,6 @@ def tried(line: str) -> str:
         _WAYS[what](rest)
     except OSError as error:
         return errno.errorcode.get(error.errno or 0, str(error))
-    except RuntimeError as error:  # The module threading raises it.
-        return str(error)
     return "done"
 
 
@@ -91,6 +89,22 @@ def _peek(pid: str) -> None:
 def _fork(_: str) -> None:
     if os.fork() == 0:
         os._exit(0)
+
+
+def _thread(_: str) -> None:
+    errors: list[OSError] = []
+
+    def work() -> None:
+        try:
+            _socket("inet")
+        except OSError as error:
+            errors.append(error)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    if errors:
+        raise errors[0]
 
 
 def _interrupt(pid: str) -> None:
@@ -141,7 +155,7 @@ _WAYS: dict[str, Callable[[str], object]] = {
     "trace": lambda pid: _called(_LIBRARY.ptrace(_ATTACH, int(pid), None, None)),
     "limit": lambda pid: resource.prlimit(int(pid), resource.RLIMIT_NOFILE, (0, 0)),
     "fork": _fork,
-    "thread": lambda _: threading.Thread(target=int).start(),
+    "thread": _thread,
     "program": lambda _: os.execv("/bin/true", ["true"]),
     "stay": lambda _: _called(_LIBRARY.prctl(_SET_PARENT_DEATH_SIGNAL, 0, 0, 0, 0)),
     "session": lambda _: os.setsid(),

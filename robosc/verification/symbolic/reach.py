@@ -191,7 +191,7 @@ class _Saturation:
         self._variables = variables
         self._groups = groups
         self._step = step
-        self._known: dict[tuple[int, int], tuple[Any, Any]] = {}
+        self._known: dict[tuple[Any, int], Any] = {}
 
     def of(self, states: Any, number: int = 0) -> Any:
         """Return a part of a set of states closed under the events of a group, and of all lower ones.
@@ -203,11 +203,10 @@ class _Saturation:
         manager = self._variables.manager
         if number == len(self._groups) or states in (manager.true, manager.false):
             return states
-        known = self._known.get((int(states), number))
+        known = self._known.get((states, number))
         if known is None:
-            # The part is kept, too: its number could else be given to another one.
-            known = self._known[int(states), number] = states, self._closed(states, number)
-        return known[1]
+            known = self._known[states, number] = self._closed(states, number)
+        return known
 
     def _closed(self, states: Any, number: int) -> Any:
         level, relations = self._groups[number]

@@ -256,12 +256,12 @@ def _by_event[T](pairs: Iterable[tuple[str, T]]) -> dict[str, list[T]]:
 def _support(manager: Any, *predicates: Any) -> frozenset[str]:
     """The variables that some predicates depend on."""
     found: set[str] = set()
-    seen: set[int] = set()
+    seen: set[Any] = set()
     stack = list(predicates)
     while stack:
         node = stack.pop()
-        if node not in (manager.true, manager.false) and int(node) not in seen:
-            seen.add(int(node))
+        if node not in (manager.true, manager.false) and node not in seen:
+            seen.add(node)
             found.add(node.var)
             stack.extend(cofactors(node))
     return frozenset(found)

@@ -11,6 +11,7 @@ from robosc.automata.state import Subject, initial_values, subject_domain, subje
 from robosc.automata.structure import InputVariable, System
 from robosc.dd_modules import load_dd
 from robosc.expressions import IntegerType, Received, Value, domain, leaves
+from robosc.oxidd_diagrams import OxiddManager
 from robosc.recursion import allow_depth
 from robosc.verification.symbolic.order import place_order, tied
 from robosc.verification.symbolic.work import Work
@@ -64,19 +65,19 @@ def after(name: str) -> str:
 
 
 def make_manager(engine: str) -> Any:
-    """A fresh manager of decision diagrams: in C where it is installed, else in plain Python.
+    """A fresh manager of decision diagrams: CUDD's where it is installed, else OxiDD's, whatever synthesis has used.
 
     Args:
-        engine: `autoref` for the plain one; with any other name the choice is free.
+        engine: `autoref` for the one in plain Python; with any other name the choice is free.
     """
-    if engine != "autoref":
+    if engine == "autoref":
+        manager = load_dd("autoref").BDD()
+    else:
         try:
             manager = load_dd("cudd").BDD(initial_cache_size=_CACHE_SLOTS, memory_estimate=_MEMORY_ESTIMATE_BYTES)
-            manager.configure(loose_up_to=_LOOSE_SLOTS)
         except ImportError:
-            manager = load_dd("autoref").BDD()
-    else:
-        manager = load_dd("autoref").BDD()
+            return OxiddManager()
+        manager.configure(loose_up_to=_LOOSE_SLOTS)
     # The order is chosen below, so that the work is the same wherever it is done.
     manager.configure(reordering=False)
     return manager
@@ -104,6 +105,8 @@ class Variables:
     ) -> None:
         self.system = system
         self.manager = make_manager(engine)
+        if isinstance(self.manager, OxiddManager):
+            work.tend = self.manager.tend
         self.work = work
         order = subjects(system)
         self.place_of = {subject: place for place, subject in enumerate(order)}
@@ -379,22 +382,20 @@ class Variables:
     def count(self, predicate: Any) -> int:
         """Return the exact number of states in which a predicate over the state's variables is true."""
         level = {name: number for number, name in enumerate(self.names)}
-        nodes: dict[int, Any] = {}
+        nodes: set[Any] = set()
         stack = [predicate]
         while stack:
             node = stack.pop()
-            if node not in (self.manager.true, self.manager.false) and int(node) not in nodes:
-                nodes[int(node)] = node
+            if node not in (self.manager.true, self.manager.false) and node not in nodes:
+                nodes.add(node)
                 stack.extend(cofactors(node))
-        counts = {int(self.manager.false): 0, int(self.manager.true): 1}
-        levels = {int(self.manager.false): len(level), int(self.manager.true): len(level)}
-        levels |= {number: level[node.var] for number, node in nodes.items()}
+        counts = {self.manager.false: 0, self.manager.true: 1}
+        levels = {self.manager.false: len(level), self.manager.true: len(level)}
+        levels |= {node: level[node.var] for node in nodes}
         # Lowest first: what a node leads to is counted before it.
-        for number in sorted(nodes, key=lambda number: -levels[number]):
-            counts[number] = sum(
-                counts[int(child)] << (levels[int(child)] - levels[number] - 1) for child in cofactors(nodes[number])
-            )
-        return counts[int(predicate)] << levels[int(predicate)]
+        for node in sorted(nodes, key=lambda node: -levels[node]):
+            counts[node] = sum(counts[child] << (levels[child] - levels[node] - 1) for child in cofactors(node))
+        return counts[predicate] << levels[predicate]
 
 
 def cofactors(node: Any) -> tuple[Any, Any]:

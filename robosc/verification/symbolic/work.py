@@ -27,18 +27,24 @@ class Work:
             out for.
         should_stop: Asked at each step; once true, the work ends.
         on_progress: Called now and then with one short line that says how far the work is.
+
+    Attributes:
+        tend: Function that lets the engine throw away what nobody needs; None if it does by itself.
     """
 
     def __init__(self, limit: int, should_stop: Callable[[], bool], on_progress: Callable[[str], None]) -> None:
         self.limit = limit
         self.done = 0
+        self.tend: Callable[[], None] | None = None
         self._steps = 0
         self._should_stop = should_stop
         self._on_progress = on_progress
 
     def again(self, times: int = 1) -> "Work":
         """Return fresh work of the same limit, or of that so many times."""
-        return Work(times * self.limit, self._should_stop, self._on_progress)
+        work = Work(times * self.limit, self._should_stop, self._on_progress)
+        work.tend = self.tend
+        return work
 
     def spend(self, amount: int) -> None:
         """Count some work.
@@ -49,6 +55,8 @@ class Work:
         """
         if self._should_stop():
             raise SynthesisCancelled("the symbolic check was stopped")
+        if self.tend is not None:
+            self.tend()
         self.done += amount
         if self.done > self.limit:
             raise TooMuchWorkError(f"more than {self.limit} nodes")
@@ -67,12 +75,12 @@ class Work:
         If few of its nodes are so high, these alone count: what is below them was there before, or counts later. Else
         all nodes do, as made by the engine.
         """
-        seen: set[int] = set()
+        seen: set[Any] = set()
         stack = [node]
         while stack and len(seen) <= _FEW:
             item = stack.pop()
-            if item.level <= deepest and int(item) not in seen:
-                seen.add(int(item))
+            if item.level <= deepest and item not in seen:
+                seen.add(item)
                 stack += (item.low, item.high)
         self.spend(int(node.dag_size) // _MADE if stack else 1 + len(seen))
         return node

@@ -183,7 +183,7 @@ def _producer_versions() -> tuple[str, ...]:
     It is this distribution, the diagrams, and those distributions whose targets and engines it uses.
     """
     # The engine `auto` is another one without dd's extension.
-    diagrams = f"dd {version('dd')} {'with' if has_cudd() else 'without'} cudd"
+    diagrams = f"dd {version('dd')} {'with' if has_cudd() else 'without'} cudd, oxidd {version('oxidd')}"
     dists = [point.dist for group in _PLUGINS for point in entry_points(group=group)]
     others = {f"{dist.name} {dist.version}" for dist in dists if dist is not None and dist.name != "robosc"}
     return (__version__, diagrams, *sorted(others))

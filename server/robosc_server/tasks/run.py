@@ -174,8 +174,10 @@ def warm_up() -> None:
 
 
 def make_ready() -> None:
-    """Make the decision diagrams of the first synthesis of every fork."""
-    keep_ready(resolve_engine("auto"))
+    """Make the decision diagrams of the first synthesis of every fork, if they make no threads, which no fork has."""
+    engine = resolve_engine("auto")
+    if engine != "oxidd":
+        keep_ready(engine)
 
 
 def _code_locations(error: BaseException) -> str:

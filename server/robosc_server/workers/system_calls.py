@@ -2,7 +2,7 @@
 
 A seccomp filter in classic BPF, for two 64-bit architectures. Every call that is not listed, including those of future
 kernels, fails with EPERM: new processes and programs, sockets, signals to and inspection of other processes, creating
-or writing files, and gaining rights.
+or writing files, and gaining rights. Threads are allowed; the address space limits how many there can be.
 """
 
 import ctypes
@@ -23,6 +23,7 @@ _LOAD, _EQUAL, _BITS, _RETURN = 0x20, 0x15, 0x45, 0x06
 
 ALLOW = 0x7FFF0000
 REFUSE = 0x00050000 | errno.EPERM
+UNKNOWN = 0x00050000 | errno.ENOSYS
 KILL = 0x80000000
 
 # Places in what the filter looks at: `struct seccomp_data`, words in the order of little-endian machines.
@@ -34,6 +35,12 @@ _NOT_FOR_READING = 0o3 | 0o100 | 0o1000 | 0o10000000
 # F_DUPFD, F_GETFD, F_SETFD, F_GETFL and F_DUPFD_CLOEXEC; others can send signals to any process.
 _DESCRIPTOR_COMMANDS = (0, 1, 2, 3, 1030)
 
+
+_THREAD = 0x3D0F00
+"""Flags with which the C library makes a thread (CLONE_VM to CLONE_CHILD_CLEARTID), and never a process.
+
+OxiDD makes two threads for each of its managers. They are confined as the one that makes them.
+"""
 
 _PLACEHOLDER_PID = 0x7FFFFFFE
 """Placeholder of the process id: real ids are below 2^22, and no other constant of a filter has this value."""
@@ -95,6 +102,8 @@ _CALLS = {
     "futex": (202, 98),
     "sched_yield": (24, 124),
     "sched_getaffinity": (204, 123),
+    "set_robust_list": (273, 99),
+    "rseq": (334, 293),
     "getcpu": (309, 168),
     "clock_gettime": (228, 113),
     "clock_getres": (229, 114),
@@ -128,6 +137,8 @@ _CALLS = {
     "mmap": (9, 222),
     "mprotect": (10, 226),
     "sendto": (44, 206),
+    "clone": (56, 220),
+    "clone3": (435, 435),
 }
 
 ARCHITECTURES = {
@@ -175,7 +186,7 @@ def _conditions(pid: int) -> dict[str, list[_Instruction]]:
     return {
         "kill": own_process,
         "tgkill": own_process,
-        # The only thread has the id of its process.
+        # The first thread has the id of its process.
         "tkill": own_process,
         "prlimit64": [_argument(0), *_unless_equal(0, refused)],
         "openat": [_argument(2), *_if_any_bit(_NOT_FOR_READING, [refused])],
@@ -189,6 +200,9 @@ def _conditions(pid: int) -> dict[str, list[_Instruction]]:
             ),
         ],
         "mprotect": [_argument(2), *_if_any_bit(_MAY_EXECUTE, [refused])],
+        "clone": [_argument(0), *_unless_equal(_THREAD, refused)],
+        # A filter cannot see these flags: the C library then uses `clone`.
+        "clone3": [_Instruction(_RETURN, UNKNOWN)],
         # The target may write to its connection alone, and to no address.
         "sendto": [_argument(4), *_unless_equal(0, refused), _argument(4, 4), *_unless_equal(0, refused)],
     }

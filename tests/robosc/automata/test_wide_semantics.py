@@ -178,7 +178,7 @@ def test_without_a_location_to_begin_in_there_is_no_initial_state() -> None:
     assert synthesize(made).reason == "there is no initial state"
 
 
-@pytest.mark.parametrize("engine", ["cudd", "autoref"])
+@pytest.mark.parametrize("engine", ["cudd", "oxidd", "autoref"])
 def test_a_controllable_event_is_allowed_only_where_each_of_its_edges_is_good(engine: str) -> None:
     if engine == "cudd":
         pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")

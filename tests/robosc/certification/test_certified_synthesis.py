@@ -60,7 +60,8 @@ def test_what_always_holds_counts_as_a_requirement() -> None:
 
 def test_the_same_bundle_gives_the_same_bytes() -> None:
     outcome = [
-        make_supervisor(example_bundle("navigation/navigation"), engine=engine) for engine in ("cudd", "autoref")
+        make_supervisor(example_bundle("navigation/navigation"), engine=engine)
+        for engine in ("cudd", "oxidd", "autoref")
     ]
     contents = {encode(item.supervisor) for item in outcome if item.supervisor}
     assert len(contents) == 1
@@ -96,7 +97,7 @@ def test_what_is_too_large_to_search_is_not_called_checked() -> None:
 def test_what_is_too_large_to_search_one_by_one_is_searched_symbolically(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Limits, "of", lambda states: Limits(10, 10, 10**6))
     contents = set()
-    for engine in ("cudd", "autoref"):
+    for engine in ("cudd", "oxidd", "autoref"):
         outcome = make_supervisor(bundle_of(COUNTER), engine=engine)
         assert outcome.supervisor is not None
         certificate = outcome.supervisor.certificate

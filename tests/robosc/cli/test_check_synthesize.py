@@ -72,7 +72,7 @@ def test_synth_prints_the_warnings_and_the_exit_status_stays(capsys: pytest.Capt
     assert "maximally permissive" in captured.out
 
 
-@pytest.mark.parametrize("engine", ["cudd", "autoref"])
+@pytest.mark.parametrize("engine", ["cudd", "oxidd", "autoref"])
 def test_deployment_and_engine_are_those_of_the_synthesis(
     capsys: pytest.CaptureFixture[str], write: Any, engine: str
 ) -> None:

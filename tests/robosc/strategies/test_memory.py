@@ -79,7 +79,7 @@ def test_places_are_observed_at_once_whatever_they_read(updates: dict[str, str])
             assert observed.after(memory_of(place, list(updates), *true)) == memory_of(place, list(updates), *after)
 
 
-@pytest.mark.parametrize("engine", ["cudd", "autoref"])
+@pytest.mark.parametrize("engine", ["cudd", "oxidd", "autoref"])
 def test_memory_is_observed_as_in_explicit_states(engine: str) -> None:
     compared = moved = 0
     for seed in range(12):

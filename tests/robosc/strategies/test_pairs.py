@@ -64,7 +64,7 @@ def compare(robot: Robot, seed: int, engine: str, patch: pytest.MonkeyPatch) -> 
     return sizes
 
 
-@pytest.mark.parametrize("engine", ["cudd", "autoref"])
+@pytest.mark.parametrize("engine", ["cudd", "oxidd", "autoref"])
 @pytest.mark.parametrize("kind", ["controllers", "couriers"])
 def test_pairs_lead_where_events_lead(engine: str, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     sizes = set[tuple[int, ...]]()
@@ -100,7 +100,7 @@ ENDLESS = """robot Wheel {
 }"""
 
 
-@pytest.mark.parametrize("engine", ["cudd", "autoref"])
+@pytest.mark.parametrize("engine", ["cudd", "oxidd", "autoref"])
 def test_silent_steps_without_end_lead_nowhere(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """From the dark lamp a message can lead to silent steps that never end: that is outside of every predicate."""
     compare((model_of(ENDLESS), ()), 0, engine, monkeypatch)

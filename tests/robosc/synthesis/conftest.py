@@ -9,7 +9,7 @@ import pytest
 from support.engines import needs_cudd
 
 
-@pytest.fixture(scope="session", params=[pytest.param("cudd", marks=needs_cudd), "autoref"])
+@pytest.fixture(scope="session", params=[pytest.param("cudd", marks=needs_cudd), "oxidd", "autoref"])
 def engine(request: pytest.FixtureRequest) -> str:
     """Name of an engine."""
     return str(request.param)

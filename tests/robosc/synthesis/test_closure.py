@@ -90,7 +90,7 @@ def swept(moves: Sequence[Move], begin: set[State], within: set[State]) -> set[S
         begin = grown
 
 
-@pytest.mark.parametrize("engine", ["cudd", "autoref"])
+@pytest.mark.parametrize("engine", ["cudd", "oxidd", "autoref"])
 @settings(max_examples=examples(50))
 @given(seed=st.integers(0, 2**32))
 def test_both_find_what_sweeps_find(engine: str, seed: int) -> None:

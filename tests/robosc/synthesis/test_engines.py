@@ -2,13 +2,24 @@
 
 import subprocess
 import sys
+from collections.abc import Iterator
 from importlib.metadata import EntryPoint
 
 import pytest
 
+from robosc import kernel
 from robosc.automata import System
-from robosc.synthesis import SynthesisStatus, UnknownEngineError, engine_names, register, resolve_engine, synthesize
+from robosc.synthesis import (
+    SynthesisStatus,
+    UnknownEngineError,
+    connection,
+    engine_names,
+    register,
+    resolve_engine,
+    synthesize,
+)
 from robosc.synthesis import engines as module
+from robosc.synthesis.engines import installed_engines
 
 EMPTY = System("Empty", (), ())
 
@@ -19,18 +30,38 @@ def test_nothing_is_imported_before_it_is_needed() -> None:
     assert done.stdout == "[]\n"
 
 
-def test_auto_is_cudd_where_it_is_installed() -> None:
-    pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
-    assert resolve_engine("auto") == "cudd"
-    assert synthesize(EMPTY).statistics.engine == "cudd"
+@pytest.fixture
+def connected_anew() -> Iterator[None]:
+    for found in (kernel._found, connection.connected):
+        found.cache_clear()
+    yield
+    for found in (kernel._found, connection.connected):
+        found.cache_clear()
 
 
-def test_without_the_extension_auto_is_plain_python(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "dd.cudd", None)  # importing it now fails
-    assert resolve_engine("auto") == "autoref"
-    assert synthesize(EMPTY).statistics.engine == "autoref"
-    with pytest.raises(UnknownEngineError, match="which is not installed; use 'autoref'"):
-        synthesize(EMPTY, engine="cudd")
+@pytest.mark.usefixtures("connected_anew")
+class TestAuto:
+    def test_is_cudd_where_the_kernel_works_with_it(self) -> None:
+        if connection.left_aside():
+            pytest.skip("there is no kernel, or no CUDD")
+        assert resolve_engine("auto") == "cudd"
+        assert synthesize(EMPTY).statistics.engine == "cudd"
+        assert installed_engines()[:3] == ("cudd", "oxidd", "autoref")
+
+    def test_is_oxidd_without_the_kernel(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+        monkeypatch.setenv("ROBOSC_KERNEL", "0")
+        assert resolve_engine("auto") == "oxidd"
+        assert synthesize(EMPTY).statistics.engine == "oxidd"
+        assert installed_engines()[:3] == ("oxidd", "cudd", "autoref")
+
+    def test_is_oxidd_without_cudd(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setitem(sys.modules, "dd.cudd", None)  # importing it now fails
+        assert resolve_engine("auto") == "oxidd"
+        assert synthesize(EMPTY).statistics.engine == "oxidd"
+        assert installed_engines()[:2] == ("oxidd", "autoref")
+        with pytest.raises(UnknownEngineError, match="which is not installed; use 'oxidd'"):
+            synthesize(EMPTY, engine="cudd")
 
 
 def test_an_engine_can_be_registered(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -42,7 +73,7 @@ def test_an_engine_can_be_registered(monkeypatch: pytest.MonkeyPatch) -> None:
         return module.make_manager("autoref")
 
     register("mine", factory)
-    assert engine_names() == ("autoref", "cudd", "mine")
+    assert engine_names() == ("autoref", "cudd", "mine", "oxidd")
     result = synthesize(EMPTY, engine="mine")
     assert (result.status, result.statistics.engine, made) == (SynthesisStatus.SUPERVISOR, "mine", ["mine"])
 
@@ -59,7 +90,7 @@ def offer(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
 
 def test_an_engine_of_another_package_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     offer(monkeypatch, "dd.autoref:BDD")
-    assert engine_names() == ("autoref", "cudd", "foreign")
+    assert engine_names() == ("autoref", "cudd", "foreign", "oxidd")
     assert synthesize(EMPTY, engine="foreign").statistics.engine == "foreign"
 
 
@@ -70,7 +101,7 @@ def test_an_engine_of_another_package_that_cannot_be_loaded(monkeypatch: pytest.
         synthesize(EMPTY, engine="foreign")
 
 
-@pytest.mark.parametrize("name", ["cudd", "autoref"])
+@pytest.mark.parametrize("name", ["cudd", "oxidd", "autoref"])
 def test_a_manager_that_is_kept_ready_is_used_once(name: str) -> None:
     if name == "cudd":
         pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")

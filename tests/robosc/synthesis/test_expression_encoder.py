@@ -66,7 +66,7 @@ def plain(expression: Expression, state: tuple[Any, ...], element: int | None, s
     )
 
 
-@pytest.fixture(scope="module", params=["cudd", "autoref"])
+@pytest.fixture(scope="module", params=["cudd", "oxidd", "autoref"])
 def valuations(request: pytest.FixtureRequest) -> Valuations:
     if request.param == "cudd":
         pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")

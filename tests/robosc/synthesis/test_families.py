@@ -22,7 +22,7 @@ SMALL = [
 ]
 
 
-@pytest.mark.parametrize("engine", ["cudd", "autoref"])
+@pytest.mark.parametrize("engine", ["cudd", "oxidd", "autoref"])
 @pytest.mark.parametrize(("family", "size"), SMALL)
 def test_symbolic_is_explicit(family: str, size: int, engine: str) -> None:
     system = FAMILIES[family](size)

@@ -18,7 +18,7 @@ from robosc import kernel
 from robosc.dd_modules import load_dd
 from robosc.errors import NodeLimitError, SynthesisCancelled
 from robosc.kernel import kernel_module, kernel_problem
-from robosc.synthesis import EngineOptions, SynthesisProgress, compiled, nodes, synthesize
+from robosc.synthesis import EngineOptions, SynthesisProgress, connection, nodes, synthesize
 from robosc.synthesis.compiled import kernel_of
 from robosc.synthesis.engines import Manager, limited, make_manager
 from robosc.synthesis.image import Image
@@ -26,6 +26,7 @@ from robosc.synthesis.monitor import BoundedMonitor, ProgressMonitor
 from robosc.synthesis.result import Closure
 from robosc.synthesis.saturation import CompiledSaturation, Saturation, saturation
 from robosc.synthesis.step import Step
+from robosc.synthesis.walks import DdNodes
 from support.effort import examples
 from support.families import FAMILIES
 
@@ -130,7 +131,7 @@ def test_it_restricts_as_python_does(seed: int) -> None:
     predicate, care = (random_predicate(manager, dice, PLACES, 5) for _ in range(2))
     found = kernel_of(manager)
     assert found is not None
-    assert found.restrict(predicate, care) == nodes._Restrict(manager).walk(predicate, care)
+    assert found.restrict(predicate, care) == nodes._Restrict(DdNodes(manager)).walk(predicate, care)
 
 
 @settings(max_examples=examples(60))
@@ -154,7 +155,7 @@ def separated_one_by_one(manager: Manager, one: Any, other: Any, groups: list[tu
 
 
 @settings(max_examples=examples(120))
-@given(seed=st.integers(0, 2**32), engine=st.sampled_from(["cudd", "autoref"]))
+@given(seed=st.integers(0, 2**32), engine=st.sampled_from(["cudd", "oxidd", "autoref"]))
 def test_places_that_do_not_tell_sets_apart_are_left_out(seed: int, engine: str) -> None:
     """The kernel tries by halves, and Python place by place: both leave out what can go first."""
     dice = Random(seed)
@@ -301,10 +302,10 @@ def test_there_is_none_for_the_plain_engine() -> None:
 
 @pytest.fixture
 def looked_for_anew() -> Iterator[None]:
-    for found in (kernel._found, compiled._connected):
+    for found in (kernel._found, connection.connected):
         found.cache_clear()
     yield
-    for found in (kernel._found, compiled._connected):
+    for found in (kernel._found, connection.connected):
         found.cache_clear()
 
 
@@ -323,13 +324,13 @@ class TestLeftAside:
         assert kernel_problem() == "it was made from other sources"
 
     def test_of_another_dd(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(compiled, "layout_problem", lambda module, cudd: "another layout")
-        assert (kernel_problem(), compiled.left_aside()) == ("", "another layout")
+        monkeypatch.setattr(connection, "layout_problem", lambda module, cudd: "another layout")
+        assert (kernel_problem(), connection.left_aside()) == ("", "another layout")
         assert kernel_of(make_manager("cudd")) is None
 
     def test_not_made(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(sys.modules, "robosc.kernel._kernel", None)
-        assert kernel_problem() == compiled.left_aside() == "it was not made: there was no C compiler"
+        assert kernel_problem() == connection.left_aside() == "it was not made: there was no C compiler"
 
 
 @pytest.mark.usefixtures("looked_for_anew")
@@ -338,9 +339,9 @@ def test_a_dd_that_keeps_cudd_to_itself_is_left_to_python(monkeypatch: pytest.Mo
     assert module is not None
     cudd = load_dd("cudd")
     hiding = SimpleNamespace(BDD=cudd.BDD, Function=cudd.Function, __file__=module.__file__)
-    monkeypatch.setattr(compiled, "load_dd", lambda name: hiding)
+    monkeypatch.setattr(connection, "load_dd", lambda name: hiding)
     assert kernel_of(make_manager("cudd")) is None
-    assert "has no Cudd_Ref" in compiled.left_aside()
+    assert "has no Cudd_Ref" in connection.left_aside()
 
 
 def test_a_library_without_cudd_is_refused() -> None:

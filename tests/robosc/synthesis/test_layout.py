@@ -12,10 +12,10 @@ import pytest
 
 from robosc import kernel
 from robosc.dd_modules import load_dd
-from robosc.synthesis import compiled
+from robosc.synthesis.connection import left_aside
 from robosc.synthesis.layout import layout_problem
 
-if kernel.kernel_module() is None or compiled.left_aside():
+if kernel.kernel_module() is None or left_aside():
     pytest.skip("there is no kernel", allow_module_level=True)
 
 CUDD: Any = load_dd("cudd")
@@ -168,7 +168,7 @@ spec.loader.exec_module(sys.modules[name])
 kernel.FOLDER = folder
 
 from robosc.synthesis import EngineOptions, synthesize
-from robosc.synthesis.compiled import left_aside
+from robosc.synthesis.connection import left_aside
 from support.families import FAMILIES
 
 found = synthesize(FAMILIES["token ring"](3), engine=EngineOptions("cudd"))

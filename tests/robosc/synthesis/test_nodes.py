@@ -21,7 +21,7 @@ formulas = st.recursive(
 )
 
 
-@pytest.fixture(scope="module", params=["cudd", "autoref"])
+@pytest.fixture(scope="module", params=["cudd", "oxidd", "autoref"])
 def manager(request: pytest.FixtureRequest) -> Any:
     if request.param == "cudd":
         pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
@@ -89,7 +89,7 @@ def _chosen(manager: Any, names: tuple[str, ...], table: int) -> Any:
 
 @settings(max_examples=examples(60))
 @given(table=st.integers(0, 2**64 - 1), order=st.permutations([*NAMES, *(f"{name}'" for name in NAMES)]))
-@pytest.mark.parametrize("engine", ["cudd", "autoref"])
+@pytest.mark.parametrize("engine", ["cudd", "oxidd", "autoref"])
 def test_names_are_right_whatever_becomes_of_the_order_meanwhile(engine: str, table: int, order: list[str]) -> None:
     if engine == "cudd":
         pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")

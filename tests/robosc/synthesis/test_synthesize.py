@@ -32,7 +32,7 @@ from support.engines import needs_cudd
 from support.models import EXAMPLE_NAMES, example_model
 from support.random_systems import explicit_supervisor, kind, random_system, wide_system
 
-ENGINES = ("cudd", "autoref")
+ENGINES = ("cudd", "oxidd", "autoref")
 PARTS = 4
 """Parts that can run beside each other."""
 

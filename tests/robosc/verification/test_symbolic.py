@@ -34,6 +34,7 @@ from robosc.verification.symbolic.relations import Relation, Relations
 from robosc.verification.symbolic.variables import Variables
 from robosc.verification.symbolic.work import TooMuchWorkError, Work
 from support.effort import examples
+from support.engines import ENGINES, engine_of_verification
 from support.families import FAMILIES
 from support.random_supervisors import random_diagram
 from support.random_systems import systems
@@ -48,7 +49,8 @@ def _three(found: Verification) -> tuple[CheckOutcome, CheckOutcome, CheckOutcom
 
 def _agrees(made: System, added: Mapping[str, Decision], engine: str = "cudd") -> Verification:
     explicit = verify_explicitly(made, added, permissive_limit=0)
-    symbolic = verify_symbolically(made, added, engine=engine)
+    with engine_of_verification(engine):
+        symbolic = verify_symbolically(made, added, engine=engine)
     assert (symbolic.states, _three(symbolic)) == (explicit.states, _three(explicit))
     assert symbolic.maximally_permissive is NOT_CHECKED
     assert symbolic.transitions is None
@@ -70,21 +72,22 @@ def _conditions(made: System, seed: int) -> dict[str, Decision]:
 
 
 @settings(max_examples=examples(25))
-@given(systems(), st.integers(0, 10**6))
-def test_on_any_supervisor_it_agrees_with_the_explicit_search(made: System, seed: int) -> None:
-    _agrees(made, {})
-    _agrees(made, _conditions(made, seed))
+@given(systems(), st.integers(0, 10**6), st.sampled_from(["cudd", "oxidd"]))
+def test_on_any_supervisor_it_agrees_with_the_explicit_search(made: System, seed: int, engine: str) -> None:
+    _agrees(made, {}, engine)
+    _agrees(made, _conditions(made, seed), engine)
 
 
 @settings(max_examples=examples(8))
 @given(systems(), st.integers(0, 10**6))
-def test_both_engines_find_the_same_with_the_same_work(made: System, seed: int) -> None:
+def test_all_engines_find_the_same_with_the_same_work(made: System, seed: int) -> None:
     added = _conditions(made, seed)
-    found = [verify_symbolically(made, added, engine=engine) for engine in ("cudd", "autoref")]
-    assert found[0] == found[1]
-    for limit in (100, 500, 2000):
-        ends = [verify_symbolically(made, added, engine=engine, limit=limit) for engine in ("cudd", "autoref")]
-        assert ends[0] == ends[1]
+    for limit in (10**6, 100, 500, 2000):
+        ends = []
+        for engine in ENGINES:
+            with engine_of_verification(engine):
+                ends.append(verify_symbolically(made, added, engine=engine, limit=limit))
+        assert ends == ends[:1] * len(ends)
 
 
 @settings(max_examples=examples(10))
@@ -146,7 +149,7 @@ def test_a_run_is_found_even_where_a_shortest_one_is_too_much_work(made: System,
 
 
 @settings(max_examples=examples(25))
-@given(systems(), st.integers(0, 10**6), st.sampled_from(["cudd", "autoref"]), st.sampled_from([0, 64]))
+@given(systems(), st.integers(0, 10**6), st.sampled_from(ENGINES), st.sampled_from([0, 64]))
 def test_closures_are_those_of_steps_taken_until_nothing_is_new(
     made: System, seed: int, engine: str, many: int
 ) -> None:
@@ -154,7 +157,8 @@ def test_closures_are_those_of_steps_taken_until_nothing_is_new(
     work = Work(10**9, lambda: False, lambda message: None)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("robosc.verification.symbolic.variables._MANY", many)
-        variables = Variables(made, engine, work)
+        with engine_of_verification(engine):
+            variables = Variables(made, engine, work)
         relations = [Relations(variables, _conditions(made, seed)).relation(event) for event in made.events]
         reachability = Reachability(variables, relations)
         initial, marked = variables.all_of(variables.initial()), variables.all_of(variables.marked())

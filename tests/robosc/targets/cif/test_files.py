@@ -352,7 +352,7 @@ def test_the_same_bytes_whatever_the_engine_and_the_hash_seed(tmp_path: Path) ->
     command = [sys.executable, "-m", "robosc.cli.main", "generate", str(model), "--target", "cif", "-o", str(folder)]
     environment = {**os.environ, "PYTHONHASHSEED": "7"}
     subprocess.run(command, env=environment, check=True, capture_output=True)
-    for engine in ("cudd", "autoref"):
+    for engine in ("cudd", "oxidd", "autoref"):
         supervisor = make_supervisor(example_bundle("maze_solver/maze_solver"), engine=engine).supervisor
         assert supervisor is not None
         for path, text in generate(supervisor, "cif").items():

@@ -165,21 +165,21 @@ def support_among(manager: Manager, names: tuple[str, ...], node: Any) -> set[st
 
 def nodes_made(known: Any, *found: Any) -> int:
     """Return the number of nodes of some predicates that another one does not have."""
-    seen = set[int]()
+    seen = set[Any]()
     _go_through([known], seen)
     before = len(seen)
     _go_through(found, seen)
     return len(seen) - before
 
 
-def _go_through(predicates: Iterable[Any], seen: set[int]) -> None:
-    """Add the numbers of all nodes of some predicates: a node and its complement are one."""
+def _go_through(predicates: Iterable[Any], seen: set[Any]) -> None:
+    """Add all nodes of some predicates: a node and its complement are one."""
     stack = list(predicates)
     while stack:
         node = stack.pop()
         regular = ~node if node.negated else node
-        if int(regular) not in seen:
-            seen.add(int(regular))
+        if regular not in seen:
+            seen.add(regular)
             if regular.var is not None:
                 stack += regular.low, regular.high
 

@@ -5,13 +5,13 @@ rebuilt into a larger one meanwhile, by this work or by another strategy on the 
 is known for certain, and nothing is counted or reported until the work is as far as it was.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from robosc.oxidd_diagrams import BCDDFunction, BooleanOperator, OxiddManager, Predicate
 from robosc.synthesis.image import Image
 from robosc.synthesis.monitor import ProgressMonitor
-from robosc.synthesis.saturation import PAUSE, Saturation
+from robosc.synthesis.saturation import NODES_OF_A_LOOK, PAUSE, Saturation
 from robosc.synthesis.step import Step
 
 _AND = BooleanOperator.AND
@@ -21,7 +21,7 @@ class _RebuiltError(Exception):
     """The functions belong to a store that has been left."""
 
 
-class _Made(NamedTuple):
+class _Prepared(NamedTuple):
     """A step on functions: what an `Image` says, with variables as conjunctions; parts that it does not have are None.
 
     Attributes:
@@ -71,7 +71,7 @@ class OxiddSaturation(Saturation):
 
     def _begun(self, states: Predicate, until: Predicate | None) -> tuple[BCDDFunction, BCDDFunction | None]:
         """Begin, or begin anew: return the functions of predicates."""
-        self._replayed, self._taken = max(self._replayed, self._taken), 0
+        self._replayed, self._taken, self._next = max(self._replayed, self._taken), 0, 0
         self._known.clear()
         self._begin()
         return states.function, None if until is None else until.function
@@ -83,19 +83,19 @@ class OxiddSaturation(Saturation):
             return
         self._generation = manager.generation
         self._at = manager.by_level()
-        self._no, self._yes = manager.false.function, manager.true.function
+        self._no = manager.false.function
         self._end = len(self._groups)
         self._inside = self._within.function
-        self._made = [(top, [_made(manager, step) for step in steps]) for top, steps in self._groups]
+        self._prepared = [(top, [_prepared(manager, step) for step in steps]) for top, steps in self._groups]
 
     def _of_function(self, states: BCDDFunction, until: BCDDFunction | None) -> BCDDFunction:
-        _, topmost = self._made[0]
+        _, topmost = self._prepared[0]
         while not self._is_done(states, until):
             before = states = self._closed(states, self._inside, 1)
             for step in topmost:
                 if self._is_done(states, until):
                     return states
-                states = self._more(states, self._inside, step, states)
+                states = self._more(states, self._inside, step)
             if states == before:
                 break
         return states
@@ -110,7 +110,7 @@ class OxiddSaturation(Saturation):
         found: BCDDFunction | None = self._known.get(key)
         if found is not None:
             return found
-        top, steps = self._made[group]
+        top, steps = self._prepared[group]
         level, other = states.node_level(), within.node_level()
         if level is None or (other is not None and other < level):
             level = other
@@ -124,12 +124,10 @@ class OxiddSaturation(Saturation):
         self._known[key] = found
         return found
 
-    def _repeated(self, states: BCDDFunction, within: BCDDFunction, group: int, steps: Sequence[_Made]) -> BCDDFunction:
-        unseen = [self._yes] * len(steps)
+    def _repeated(self, states: BCDDFunction, within: BCDDFunction, group: int, steps: Sequence[_Prepared]) -> BCDDFunction:
         vain, number, count = 0, 0, len(steps)
         while vain < count:
-            grown = self._more(states, within, steps[number], states & unseen[number])
-            unseen[number] = ~states
+            grown = self._more(states, within, steps[number])
             number = (number + 1) % count
             vain += 1
             if grown != states:
@@ -137,11 +135,18 @@ class OxiddSaturation(Saturation):
                 vain = 0
         return states
 
-    def _more(self, states: BCDDFunction, within: BCDDFunction, step: _Made, new: BCDDFunction) -> BCDDFunction:
-        self._counted(states, new)
-        no = self._no
-        if new == no:
-            return states
+    def _more(self, states: BCDDFunction, within: BCDDFunction, step: _Prepared) -> BCDDFunction:
+        self._before(states)
+        added = self._added(states, within, step)
+        more = states | added
+        if self._taken >= self._next:
+            self._made = _nodes_made(states, added, more)
+            self._next = self._taken + PAUSE + states.node_count() // NODES_OF_A_LOOK
+        self._taken += 1
+        return more
+
+    def _added(self, states: BCDDFunction, within: BCDDFunction, step: _Prepared) -> BCDDFunction:
+        new, no = states, self._no
         inside, needed, fixed, moved, relation, hidden, called, outside, room = step
         if room is not None and (within & room & ~states) == no:
             return states
@@ -150,33 +155,52 @@ class OxiddSaturation(Saturation):
         if needed is not None and fixed is not None:
             new = new.apply_exists(_AND, needed, fixed)
             if new == no:
-                return states
+                return no
         if moved is not None:
             new = new.substitute(moved)
         new = new & relation if hidden is None else new.apply_exists(_AND, relation, hidden)
         if new == no:
-            return states
+            return no
         if called is not None:
             new = new.substitute(called)
         if outside is not None:
             new = new & outside
-        return states | (within & new)
+        return within & new
 
-    def _counted(self, states: BCDDFunction, new: BCDDFunction) -> None:
-        if self._taken >= self._replayed:
-            if self._taken % PAUSE == 0:
-                self._monitor.check_stop(self._taken - self._spent)
-                self._spend(new.node_count())
-                if self._generation != self._oxidd.generation:
-                    raise _RebuiltError
-            if self._taken + 1 >= (self._reports + 1) * self._count:
-                self._taken += 1
-                self._report(Predicate(self._oxidd, states))
-                return
-        self._taken += 1
+    def _before(self, states: BCDDFunction) -> None:
+        if self._taken < self._replayed:
+            return
+        if self._taken % PAUSE == 0:
+            self._monitor.check_stop(self._taken - self._spent)
+            self._spend()
+            if self._generation != self._oxidd.generation:
+                raise _RebuiltError
+        if self._taken + 1 >= (self._reports + 1) * self._count:
+            self._report(Predicate(self._oxidd, states))
 
 
-def _made(manager: OxiddManager, step: Step) -> _Made:
+def _nodes_made(known: BCDDFunction, *found: BCDDFunction) -> int:
+    """Return the number of nodes of some functions that another one does not have."""
+    seen = set[BCDDFunction]()
+    _go_through([known], seen)
+    before = len(seen)
+    _go_through(found, seen)
+    return len(seen) - before
+
+
+def _go_through(functions: Iterable[BCDDFunction], seen: set[BCDDFunction]) -> None:
+    """Add all functions below some ones; a function and its complement have one node."""
+    stack = list(functions)
+    while stack:
+        function = stack.pop()
+        complement = ~function
+        regular = function if function < complement else complement
+        if regular not in seen:
+            seen.add(regular)
+            stack += regular.cofactors() or ()
+
+
+def _prepared(manager: OxiddManager, step: Step) -> _Prepared:
     image: Image = step.add  # type: ignore[assignment]  # closure_under has looked
 
     def function(predicate: Any) -> BCDDFunction | None:
@@ -194,7 +218,7 @@ def _made(manager: OxiddManager, step: Step) -> _Made:
     if outside is not None and not image.names and not image.hidden:
         relation = relation & outside
         outside = None
-    return _Made(
+    return _Prepared(
         inside=inside,
         needed=needed if image.constants else None,
         fixed=manager.variables(image.constants) if image.constants else None,

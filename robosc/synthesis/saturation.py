@@ -24,10 +24,10 @@ from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.nodes import cofactors, nodes_made
 from robosc.synthesis.step import Step, is_enough
 
-_PAUSE = 16
+PAUSE = 16
 """Steps after which work is counted, and after which one step at most is looked at to estimate what the others cost."""
 
-_NODES_OF_A_LOOK = 4
+NODES_OF_A_LOOK = 4
 """Nodes of the states for which a look is put off by a step: to go through them takes as long as some steps."""
 
 _STEP_NODES = 10
@@ -151,7 +151,7 @@ class Saturation:
 
     def _grown(self, states: Any, within: Any, step: Step) -> Any:
         self._monitor.check_stop()
-        if self._taken % _PAUSE == 0:
+        if self._taken % PAUSE == 0:
             self._spend()
         if self._taken + 1 >= (self._reports + 1) * self._count:
             self._report(states)
@@ -159,7 +159,7 @@ class Saturation:
         grown = states | added
         if self._taken >= self._next:
             self._made = nodes_made(states, added, grown)
-            self._next = self._taken + _PAUSE + states.dag_size // _NODES_OF_A_LOOK
+            self._next = self._taken + PAUSE + states.dag_size // NODES_OF_A_LOOK
         self._taken += 1
         return grown
 

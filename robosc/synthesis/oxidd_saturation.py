@@ -124,7 +124,9 @@ class OxiddSaturation(Saturation):
         self._known[key] = found
         return found
 
-    def _repeated(self, states: BCDDFunction, within: BCDDFunction, group: int, steps: Sequence[_Prepared]) -> BCDDFunction:
+    def _repeated(
+        self, states: BCDDFunction, within: BCDDFunction, group: int, steps: Sequence[_Prepared]
+    ) -> BCDDFunction:
         vain, number, count = 0, 0, len(steps)
         while vain < count:
             grown = self._more(states, within, steps[number])

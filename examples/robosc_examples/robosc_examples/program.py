@@ -8,6 +8,7 @@ to rest, and only then the context goes.
 import difflib
 import signal
 import sys
+import time
 from collections.abc import Callable, Sequence
 from types import FrameType
 from typing import Any
@@ -19,9 +20,13 @@ from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import get_rmw_implementation_identifier
 
 SPIN_S = 0.1
 DELIVERY_S = 0.5
+ACKNOWLEDGING = ("rmw_fastrtps", "rmw_cyclonedds", "rmw_connextdds")
+"""Middlewares that say when a message has arrived; Zenoh says so at once, and others are not known."""
+UNACKNOWLEDGED_S = 0.3
 EXIT_OK = 0
 EXIT_FAULT = 1
 EXIT_USAGE = 2
@@ -125,6 +130,8 @@ class HelperNode(Node):  # type: ignore[misc]  # rclpy has no types
         """Give what was sent last the time to arrive."""
         for publisher in self.publishers:
             publisher.wait_for_all_acked(Duration(seconds=DELIVERY_S))
+        if not get_rmw_implementation_identifier().startswith(ACKNOWLEDGING):
+            time.sleep(UNACKNOWLEDGED_S)
 
 
 class Signals:

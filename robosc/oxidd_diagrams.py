@@ -153,18 +153,18 @@ class Predicate:
     @property
     def negated(self) -> bool:
         """True if the predicate is the complement of its node."""
-        # Of a predicate and its complement, the one that is true where all variables are comes first.
+        # The one of a predicate and its complement that is true where all variables are comes first.
         return not self.function < ~self.function
 
     @property
     def low(self) -> "Predicate":
-        """Where the topmost variable of the node, which a complement has as well, is false."""
+        """The node below, where the topmost variable is false; a complement has the same one."""
         low = self.cofactors[0]
         return ~low if self.negated else low
 
     @property
     def high(self) -> "Predicate":
-        """Where the topmost variable of the node is true."""
+        """The node below, where the topmost variable is true; a complement has the same one."""
         high = self.cofactors[1]
         return ~high if self.negated else high
 
@@ -263,7 +263,7 @@ class OxiddManager:
         if left > slots // 2 or made > 4 * self._due:
             slots = min(MAXIMUM_SLOTS, _SLOTS_GROW * slots)
         if (nodes, slots) != (self._nodes, self._slots):
-            # Where there is no memory for that, what there is may do.
+            # If there is no memory for that, what there is may do.
             with suppress(MemoryError):
                 self._rebuild(nodes, slots)
         self._due = max(self._slots, 3 * left)

@@ -210,7 +210,7 @@ def _prepared(manager: OxiddManager, step: Step) -> _Prepared:
 
     inside, needed, outside = function(image.inside), function(image.needed), function(image.outside)
     relation: BCDDFunction = image.relation.function
-    # What is conjoined next anyway is conjoined once for all sets of states.
+    # Two predicates that are conjoined one after the other are conjoined once for all sets of states.
     if inside is not None and needed is not None:
         needed = needed & inside
         inside = None

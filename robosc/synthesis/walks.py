@@ -16,8 +16,8 @@ class Nodes(Protocol):
     """Nodes of one manager.
 
     Attributes:
-        restricted: What has been found for nodes restricted to others.
-        taken_apart: What has been found for nodes by the values of a place of the state: see `diagrams`.
+        restricted: Results for nodes restricted to others.
+        taken_apart: Results for nodes by the values of a place of the state: see `diagrams`.
     """
 
     true: Any

@@ -94,7 +94,7 @@ def test_synthesis_is_the_same_whatever_grows_meanwhile(small: list[OxiddManager
     made = random_system(seed)
     grown, plain = synthesize(made, engine="small"), synthesize(made, engine="oxidd")
     assert (grown.status, grown.added, grown.initial) == (plain.status, plain.added, plain.initial)
-    # What races count is not counted twice where a closure has begun anew.
+    # A closure that has begun anew counts for a race once.
     assert grown.statistics.race == plain.statistics.race
     assert grown.statistics.peak_nodes == plain.statistics.peak_nodes
 

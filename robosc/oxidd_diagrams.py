@@ -57,7 +57,7 @@ else:
         _module.BooleanOperator,
         _module.DDMemoryError,
     )
-    # OxiDD reads this with each operation. An interrupt within a function of Python would become an error of types there.
+    # OxiDD reads this with each operation, and takes an interrupt in a function of Python for an error of types.
     type.__setattr__(BooleanOperator, "value", property(attrgetter("_value_")))
 
 FIRST_NODES = 2**24

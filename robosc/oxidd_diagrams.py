@@ -17,6 +17,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from importlib.util import find_spec, module_from_spec
+from operator import attrgetter
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -56,6 +57,8 @@ else:
         _module.BooleanOperator,
         _module.DDMemoryError,
     )
+    # OxiDD reads this with each operation, and takes an interrupt in a function of Python for an error of types.
+    type.__setattr__(BooleanOperator, "value", property(attrgetter("_value_")))
 
 FIRST_NODES = 2**24
 """Nodes that a manager has room for at the beginning: memory is taken only for those that are there.
@@ -63,8 +66,11 @@ FIRST_NODES = 2**24
 An operation that needs more begins anew in a larger manager. It cannot be interrupted, but it can be in between.
 """
 
-_SHARE = 4
-"""Times the memory for a new manager that there has to be: others will be made, and Python wants some, too."""
+_LEAST_NODES = 2**16
+"""Nodes that a manager begins with where memory is short."""
+
+_SHARE = 3
+"""Times the memory for a new store that there has to be: others will be made, and Python wants some, too."""
 
 FIRST_SLOTS = 2**18
 """Results of operations that a manager remembers at the beginning: setting them up takes two milliseconds and 5 MB."""
@@ -204,13 +210,14 @@ class OxiddManager:
         self._is_reordering = False
         self._is_in_order = True
         self._is_last_attempt = False
-        self._open(nodes, slots, 2 * slots)
+        self._open(nodes, slots, min(nodes, _LEAST_NODES))
         self.true = Predicate(self, self._store.true())
         self.false = Predicate(self, self._store.false())
 
     def _open(self, nodes: int, slots: int, least: int) -> None:
         """Begin with an empty store of some nodes, or of fewer if there is no room, but not of fewer than the least."""
-        nodes = _with_room(nodes, slots, least, 1 if self.generation else _SHARE)
+        nodes = _with_room(nodes, slots, least)
+        slots = min(slots, nodes)
         self._nodes, self._slots = nodes, slots
         self._due = slots
         self._store = BCDDManager(nodes, slots, 1)
@@ -536,8 +543,8 @@ def reorder(manager: OxiddManager, levels: Mapping[str, int] | None = None) -> N
             break
 
 
-def _with_room(nodes: int, slots: int, least: int, times: int) -> int:
-    """Return the number of nodes, at most as many as given, that there is memory for so many times.
+def _with_room(nodes: int, slots: int, least: int) -> int:
+    """Return the number of nodes, at most as many as given, that there is memory for several times.
 
     Raises:
         MemoryError: There is memory for fewer than the least.
@@ -545,8 +552,8 @@ def _with_room(nodes: int, slots: int, least: int, times: int) -> int:
     # OxiDD ends the process where it is refused memory.
     while True:
         try:
-            needed = (_NODE_BYTES + _TABLE_BYTES) * nodes + _SLOT_BYTES * slots + _THREAD_BYTES
-            mmap.mmap(-1, times * needed).close()
+            needed = (_NODE_BYTES + _TABLE_BYTES) * nodes + _SLOT_BYTES * min(slots, nodes) + _THREAD_BYTES
+            mmap.mmap(-1, _SHARE * needed).close()
             return nodes
         except (OSError, ValueError) as error:
             nodes //= 2

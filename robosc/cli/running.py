@@ -121,6 +121,8 @@ def guarded(program: str, run: Callable[[], int], *, as_json: bool = False) -> i
         # An unknown engine or target, or a folder that cannot be written, is no fault of the model.
         status = ExitCode.USAGE if isinstance(error, LookupError | OSError) else ExitCode.FAILED
         message = _complain(program, error)
+    except MemoryError as error:
+        status, message = ExitCode.FAILED, _complain(program, str(error) or "there is not enough memory")
     except KeyboardInterrupt:
         status, message = ExitCode.INTERRUPTED, _complain(program, "interrupted")
     except BrokenPipeError:

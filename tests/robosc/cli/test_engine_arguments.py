@@ -49,11 +49,23 @@ def test_a_limit_that_is_no_such_number_is_wrong_use(
 
 
 @pytest.mark.parametrize("command", [["synth"], ["explore"], ["check", "--synthesize"]])
-@pytest.mark.parametrize("engine", ["auto", "autoref"])
+@pytest.mark.parametrize("engine", ["auto", "oxidd", "autoref"])
 def test_too_few_nodes_end_it(capsys: pytest.CaptureFixture[str], command: list[str], engine: str) -> None:
     assert main([*command, NAVIGATION, "--max-nodes", "50", "--engine", engine]) == 1
     captured = capsys.readouterr()
     assert captured.err == "robosc: BDD node limit 50 exceeded; raise it with --max-nodes\n"
+
+
+@pytest.mark.parametrize("reason", ["the decision diagrams were refused memory", ""])
+def test_memory_that_is_refused_ends_it(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, reason: str
+) -> None:
+    def refused(name: str) -> None:
+        raise MemoryError(reason)
+
+    monkeypatch.setattr("robosc.synthesis.workspace.make_manager", refused)
+    assert main(["synth", NAVIGATION]) == 1
+    assert capsys.readouterr().err == f"robosc: {reason or 'there is not enough memory'}\n"
 
 
 @pytest.mark.parametrize("option", [["--reorder"], ["--max-nodes", "5"]])

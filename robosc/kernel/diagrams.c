@@ -14,7 +14,7 @@
 #include <limits.h>
 
 /* The twins of constants in saturation.py. */
-enum { PAUSE = 16, NODES_OF_A_LOOK = 4 };
+enum { PAUSE = 16, NODES_OF_A_LOOK = 4, LONGEST = 64 };
 
 typedef struct DdManager DdManager;
 typedef struct DdNode DdNode;
@@ -337,7 +337,8 @@ static void look_at(Closure *closure, DdNode *states, DdNode *added, DdNode *fou
     DdNode *all[] = {states, added, found};
     int size = cudd.dag_size(states);
     closure->made = cudd.sharing_size(all, 3) - size;
-    closure->next = closure->taken + PAUSE + size / NODES_OF_A_LOOK;
+    int later = PAUSE + size / NODES_OF_A_LOOK;
+    closure->next = closure->taken + (later < LONGEST ? later : LONGEST);
 }
 
 /* States, and the states within a predicate that a step reaches from them. */

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from robosc.oxidd_diagrams import BCDDFunction, BooleanOperator, OxiddManager, Predicate
 from robosc.synthesis.image import Image
 from robosc.synthesis.monitor import ProgressMonitor
-from robosc.synthesis.saturation import NODES_OF_A_LOOK, PAUSE, Saturation
+from robosc.synthesis.saturation import LONGEST, NODES_OF_A_LOOK, PAUSE, Saturation
 from robosc.synthesis.step import Step
 
 _AND = BooleanOperator.AND
@@ -143,7 +143,7 @@ class OxiddSaturation(Saturation):
         more = states | added
         if self._taken >= self._next:
             self._made = _nodes_made(states, added, more)
-            self._next = self._taken + PAUSE + states.node_count() // NODES_OF_A_LOOK
+            self._next = self._taken + min(PAUSE + states.node_count() // NODES_OF_A_LOOK, LONGEST)
         self._taken += 1
         return more
 

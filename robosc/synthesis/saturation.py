@@ -30,6 +30,9 @@ PAUSE = 16
 NODES_OF_A_LOOK = 4
 """Nodes of the states for which a look is put off by a step: to go through them takes as long as some steps."""
 
+LONGEST = 64
+"""Steps after which one is looked at in any case: they may have come to make far more nodes than the last one."""
+
 _STEP_NODES = 10
 """Nodes that a step counts for beside those that it makes: what it finds in caches takes about as long."""
 
@@ -159,7 +162,7 @@ class Saturation:
         grown = states | added
         if self._taken >= self._next:
             self._made = nodes_made(states, added, grown)
-            self._next = self._taken + PAUSE + states.dag_size // NODES_OF_A_LOOK
+            self._next = self._taken + min(PAUSE + states.dag_size // NODES_OF_A_LOOK, LONGEST)
         self._taken += 1
         return grown
 

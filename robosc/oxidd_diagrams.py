@@ -330,7 +330,7 @@ class OxiddManager:
             if not self._is_in_order:
                 self._store.set_var_order([self._numbers[name] for name in order])
             copy = _Copy(self._store)
-            functions = [copy.of(item.function) for item in predicates]
+            functions = [copy.copied(item.function) for item in predicates]
         except MemoryError:
             self.__dict__.update(old)
             raise
@@ -570,7 +570,8 @@ class _Copy:
         self._known: dict[BCDDFunction, BCDDFunction] = {}
         self._true = store.true()
 
-    def of(self, function: BCDDFunction) -> BCDDFunction:
+    def copied(self, function: BCDDFunction) -> BCDDFunction:
+        """Return a function of another store in this one."""
         number = function.node_var()
         if number is None:
             return self._true if function.valid() else ~self._true
@@ -580,5 +581,5 @@ class _Copy:
             if opposite is not None:
                 return ~opposite
             high, low = function.cofactors()  # type: ignore[misc]  # it is no constant
-            found = self._known[function] = self._variables[number].ite(self.of(high), self.of(low))
+            found = self._known[function] = self._variables[number].ite(self.copied(high), self.copied(low))
         return found

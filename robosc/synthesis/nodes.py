@@ -163,25 +163,40 @@ def support_among(manager: Manager, names: tuple[str, ...], node: Any) -> set[st
     return manager.support(node, names) if isinstance(manager, OxiddManager) else manager.support(node)
 
 
-def nodes_made(known: Any, *found: Any) -> int:
-    """Return the number of nodes of some predicates that another one does not have."""
+def regular(predicate: Any) -> Any:
+    """Return the one of a predicate and its complement that stands for their node."""
+    return ~predicate if predicate.negated else predicate
+
+
+def children(predicate: Any) -> Sequence[Any]:
+    """Return the predicates below a node: none below a constant."""
+    return () if predicate.var is None else (predicate.low, predicate.high)
+
+
+def nodes_made(
+    known: Any,
+    *found: Any,
+    node_of: Callable[[Any], Any] = regular,
+    below: Callable[[Any], Iterable[Any]] = children,
+) -> int:
+    """Return the number of nodes of some predicates that another one does not have.
+
+    Args:
+        known: The other one.
+        found: The predicates.
+        node_of: Function that returns the same for a predicate and its complement.
+        below: Function that returns what is below that.
+    """
     seen = set[Any]()
-    _go_through([known], seen)
-    before = len(seen)
-    _go_through(found, seen)
+    before = 0
+    for predicates in ([known], list(found)):
+        before = len(seen)
+        while predicates:
+            node = node_of(predicates.pop())
+            if node not in seen:
+                seen.add(node)
+                predicates += below(node)
     return len(seen) - before
-
-
-def _go_through(predicates: Iterable[Any], seen: set[Any]) -> None:
-    """Add all nodes of some predicates: a node and its complement are one."""
-    stack = list(predicates)
-    while stack:
-        node = stack.pop()
-        regular = ~node if node.negated else node
-        if regular not in seen:
-            seen.add(regular)
-            if regular.var is not None:
-                stack += regular.low, regular.high
 
 
 def without(manager: Manager, states: Any, cubes: Sequence[Any]) -> Any:

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from robosc.oxidd_diagrams import BCDDFunction, BooleanOperator, OxiddManager, Predicate
 from robosc.synthesis.image import Image
 from robosc.synthesis.monitor import ProgressMonitor
+from robosc.synthesis.nodes import nodes_made
 from robosc.synthesis.saturation import LONGEST, NODES_OF_A_LOOK, PAUSE, Saturation
 from robosc.synthesis.step import Step
 
@@ -142,7 +143,7 @@ class OxiddSaturation(Saturation):
         added = self._added(states, within, step)
         more = states | added
         if self._taken >= self._next:
-            self._made = _nodes_made(states, added, more)
+            self._made = nodes_made(states, added, more, node_of=_regular, below=_below)
             self._next = self._taken + min(PAUSE + states.node_count() // NODES_OF_A_LOOK, LONGEST)
         self._taken += 1
         return more
@@ -181,25 +182,13 @@ class OxiddSaturation(Saturation):
             self._report(Predicate(self._oxidd, states))
 
 
-def _nodes_made(known: BCDDFunction, *found: BCDDFunction) -> int:
-    """Return the number of nodes of some functions that another one does not have."""
-    seen = set[BCDDFunction]()
-    _go_through([known], seen)
-    before = len(seen)
-    _go_through(found, seen)
-    return len(seen) - before
+def _regular(function: BCDDFunction) -> BCDDFunction:
+    """Return the one of a function and its complement that stands for their node."""
+    return min(function, ~function)
 
 
-def _go_through(functions: Iterable[BCDDFunction], seen: set[BCDDFunction]) -> None:
-    """Add all functions below some ones; a function and its complement have one node."""
-    stack = list(functions)
-    while stack:
-        function = stack.pop()
-        complement = ~function
-        regular = function if function < complement else complement
-        if regular not in seen:
-            seen.add(regular)
-            stack += regular.cofactors() or ()
+def _below(function: BCDDFunction) -> Iterable[BCDDFunction]:
+    return function.cofactors() or ()
 
 
 def _prepared(manager: OxiddManager, step: Step) -> _Prepared:

@@ -94,7 +94,7 @@ def test_the_same_comes_out_again(monkeypatch: pytest.MonkeyPatch) -> None:
     system = shuffled(SEEDED_FAMILIES["product line"](30, 1), 3)
     found = synthesize(system, engine="cudd")
     assert len(found.statistics.race) == 3
-    for engine in ("cudd", "cudd", "autoref"):
+    for engine in ("cudd", "cudd", "oxidd", "autoref"):
         again = synthesize(system, engine=engine)
         assert (again.added, again.initial) == (found.added, found.initial)
         assert again.statistics.race == found.statistics.race

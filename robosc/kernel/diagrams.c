@@ -13,8 +13,8 @@
 #include <dlfcn.h>
 #include <limits.h>
 
-/* The twins of constants in saturation.py. */
-enum { PAUSE = 16, NODES_OF_A_LOOK = 4, LONGEST = 64 };
+/* The twins of constants in saturation.py and in nodes.py. */
+enum { PAUSE = 16, MATES = 8 };
 
 typedef struct DdManager DdManager;
 typedef struct DdNode DdNode;
@@ -45,7 +45,6 @@ static struct {
     DdNode *(*variable)(DdManager *, int);
     int (*size)(DdManager *);
     int (*dag_size)(DdNode *);
-    int (*sharing_size)(DdNode **, int);
 } cudd;
 
 static const struct {
@@ -70,7 +69,6 @@ static const struct {
     {"Cudd_bddIthVar", &cudd.variable},
     {"Cudd_ReadSize", &cudd.size},
     {"Cudd_DagSize", &cudd.dag_size},
-    {"Cudd_SharingSize", &cudd.sharing_size},
 };
 
 /* Nodes */
@@ -202,6 +200,50 @@ static void free_table(DdManager *manager, Table *table) {
     PyMem_Free(table->entries);
 }
 
+/* Sets of nodes; they own none. */
+
+typedef struct {
+    DdNode **nodes;
+    size_t size, count;
+} Set;
+
+static int make_set(Set *set, size_t size) {
+    *set = (Set){PyMem_Calloc(size, sizeof(DdNode *)), size, 0};
+    if (set->nodes == NULL) {
+        PyErr_NoMemory();
+        return 0;
+    }
+    return 1;
+}
+
+/* Put a node into a set: 1 if it was not there, 0 if it was, -1 if there is no memory. */
+static int include(Set *set, DdNode *node) {
+    if (2 * set->count >= set->size) {
+        Set larger;
+        if (!make_set(&larger, 4 * set->size)) {
+            return -1;
+        }
+        for (size_t place = 0; place < set->size; place++) {
+            if (set->nodes[place] != NULL) {
+                include(&larger, set->nodes[place]);
+            }
+        }
+        PyMem_Free(set->nodes);
+        *set = larger;
+    }
+    uint64_t hash = (uint64_t)(uintptr_t)node * 0x9E3779B97F4A7C15u;
+    size_t place = (size_t)(hash >> 20) & (set->size - 1);
+    while (set->nodes[place] != NULL) {
+        if (set->nodes[place] == node) {
+            return 0;
+        }
+        place = (place + 1) & (set->size - 1);
+    }
+    set->nodes[place] = node;
+    set->count++;
+    return 1;
+}
+
 /* Steps */
 
 typedef struct {
@@ -216,7 +258,7 @@ typedef struct {
 
 /* The image of a set of states under an event: see image.py. Parts that a step does not have are NULL. */
 typedef struct {
-    DdNode *inside, *needed, *constants, *relation, *hidden, *outside, *room;
+    DdNode *inside, *needed, *constants, *relation, *hidden, *outside, *room, *touched;
     Substitutions functions, names;
 } Step;
 
@@ -234,9 +276,8 @@ typedef struct {
     Py_ssize_t group_count, step_count;
     Table known;
     PyObject *pause, *report;
-    /* Steps taken in all, at the last call of `pause`, and when to look at a step again; nodes the last such step made. */
-    long long taken, reported, asked, next;
-    int made;
+    /* Steps taken in all, and at the last call of `pause`; nodes that the first step after that made. */
+    long long taken, reported, asked, made;
 } Closure;
 
 static DdNode *composed(Closure *closure, DdNode *f, const Substitutions *substitutions) {
@@ -311,7 +352,7 @@ static int report_round(Closure *closure, DdNode *states) {
 static int may_go_on(Closure *closure) {
     long long steps = closure->taken - closure->asked;
     closure->asked = closure->taken;
-    return answered(PyObject_CallFunction(closure->pause, "Li", steps, closure->made));
+    return answered(PyObject_CallFunction(closure->pause, "LL", steps, closure->made));
 }
 
 /* The states within a predicate that a step reaches from some states; these if they are all there is. */
@@ -332,19 +373,81 @@ static DdNode *added_by(Closure *closure, DdNode *states, DdNode *within, const 
     return added == NULL ? NULL : instead(manager, added, conjunction(manager, added, within));
 }
 
-/* Count the nodes that a step has made, and put off the next look: the larger the diagrams, the longer. */
-static void look_at(Closure *closure, DdNode *states, DdNode *added, DdNode *found) {
-    DdNode *all[] = {states, added, found};
-    int size = cudd.dag_size(states);
-    closure->made = cudd.sharing_size(all, 3) - size;
-    int later = PAUSE + size / NODES_OF_A_LOOK;
-    closure->next = closure->taken + (later < LONGEST ? later : LONGEST);
+/* Nodes known before a step that may stand where one does after it: as many as fit. */
+typedef struct {
+    DdNode *nodes[MATES];
+    int count;
+} Mates;
+
+static void add_mate(Mates *mates, DdNode *node) {
+    node = regular(node);
+    for (int place = 0; place < mates->count; place++) {
+        if (mates->nodes[place] == node) {
+            return;
+        }
+    }
+    if (mates->count < MATES) {
+        mates->nodes[mates->count++] = node;
+    }
+}
+
+/* Put the nodes that a step has made into a set, as far as `nodes_made` of nodes.py finds them; `touched` are variables
+   of the step. It returns false if there is no memory. */
+static int gather_made(DdManager *manager, DdNode *f, Mates mates, DdNode *touched, Set *made) {
+    DdNode *node = regular(f);
+    int level = level_of(manager, node);
+    for (int place = 0; place < mates.count; place++) {
+        while (level_of(manager, mates.nodes[place]) < level) {
+            DdNode *above = mates.nodes[place];
+            mates.nodes[place] = regular(cudd.low(above));
+            add_mate(&mates, cudd.high(above));
+        }
+        if (mates.nodes[place] == node) {
+            return 1;
+        }
+    }
+    int is_new = level == INT_MAX ? 0 : include(made, node);
+    if (is_new <= 0) {
+        return is_new == 0;
+    }
+    while (level_of(manager, touched) < level) {
+        touched = cudd.high(touched);
+    }
+    int is_touched = level_of(manager, touched) == level;
+    for (int branch = 0; branch < 2; branch++) {
+        Mates below = {.count = 0};
+        for (int other = 0; other <= is_touched; other++) {
+            for (int place = 0; place < mates.count; place++) {
+                DdNode *mate = mates.nodes[place];
+                if (level_of(manager, mate) > level) {
+                    add_mate(&below, mate);
+                } else {
+                    add_mate(&below, branch ^ other ? cudd.high(mate) : cudd.low(mate));
+                }
+            }
+        }
+        if (!gather_made(manager, branch ? cudd.high(node) : cudd.low(node), below, touched, made)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* Count the nodes that a step has made: what this takes grows with them, and not with the predicate. */
+static int look_at(Closure *closure, DdNode *states, DdNode *found, const Step *step) {
+    Set made;
+    Mates known = {{regular(states)}, 1};
+    int is_done = make_set(&made, 1024) && gather_made(closure->manager, found, known, step->touched, &made);
+    closure->made = (long long)made.count;
+    PyMem_Free(made.nodes);
+    return is_done;
 }
 
 /* States, and the states within a predicate that a step reaches from them. */
 static DdNode *grown(Closure *closure, DdNode *states, DdNode *within, const Step *step) {
     DdManager *manager = closure->manager;
-    if (closure->taken % PAUSE == 0 && !may_go_on(closure)) {
+    int is_looked_at = closure->taken % PAUSE == 0;
+    if (is_looked_at && !may_go_on(closure)) {
         return NULL;
     }
     if (closure->taken + 1 >= (closure->reported + 1) * closure->step_count && !report_round(closure, states)) {
@@ -352,8 +455,8 @@ static DdNode *grown(Closure *closure, DdNode *states, DdNode *within, const Ste
     }
     DdNode *added = added_by(closure, states, within, step);
     DdNode *found = added == NULL ? NULL : disjunction(manager, states, added);
-    if (found != NULL && closure->taken >= closure->next) {
-        look_at(closure, states, added, found);
+    if (found != NULL && is_looked_at && !look_at(closure, states, found, step)) {
+        found = instead(manager, found, NULL);
     }
     closure->taken++;
     drop(manager, added);
@@ -480,10 +583,10 @@ static int read_substitutions(Closure *closure, PyObject *pairs, Substitutions *
 }
 
 static int read_step(Closure *closure, PyObject *tuple, Step *step) {
-    unsigned long long inside, needed, constants, relation, hidden, outside, room;
+    unsigned long long inside, needed, constants, relation, hidden, outside, room, touched;
     PyObject *functions, *names;
-    if (!PyArg_ParseTuple(tuple, "KKKOKKOKK", &inside, &needed, &constants, &functions, &relation, &hidden, &names,
-                          &outside, &room)) {
+    if (!PyArg_ParseTuple(tuple, "KKKOKKOKKK", &inside, &needed, &constants, &functions, &relation, &hidden, &names,
+                          &outside, &room, &touched)) {
         return 0;
     }
     step->inside = (DdNode *)(uintptr_t)inside;
@@ -493,6 +596,7 @@ static int read_step(Closure *closure, PyObject *tuple, Step *step) {
     step->hidden = (DdNode *)(uintptr_t)hidden;
     step->outside = (DdNode *)(uintptr_t)outside;
     step->room = (DdNode *)(uintptr_t)room;
+    step->touched = (DdNode *)(uintptr_t)touched;
     return read_substitutions(closure, functions, &step->functions) && read_substitutions(closure, names, &step->names);
 }
 
@@ -594,6 +698,37 @@ PyObject *diagram_closure(PyObject *module, PyObject *arguments) {
 
 /* Restriction */
 
+/* Find the lowest level of a predicate's variables; false if there is no memory. */
+static int find_lowest(DdManager *manager, DdNode *f, Set *seen, int *lowest) {
+    DdNode *node = regular(f);
+    int level = level_of(manager, node);
+    int is_new = level == INT_MAX ? 0 : include(seen, node);
+    if (is_new <= 0) {
+        return is_new == 0;
+    }
+    *lowest = level > *lowest ? level : *lowest;
+    return find_lowest(manager, cudd.low(node), seen, lowest) && find_lowest(manager, cudd.high(node), seen, lowest);
+}
+
+/* What matters of `care` to a predicate: no variable above all of its own, or below them. Restricting would leave these
+   out, too, one after the other, and the sets in between are large. */
+static DdNode *relevant(DdManager *manager, DdNode *f, DdNode *care) {
+    Set seen;
+    int highest = level_of(manager, f), lowest = -1;
+    int is_found = make_set(&seen, 256) && find_lowest(manager, f, &seen, &lowest);
+    PyMem_Free(seen.nodes);
+    DdNode *cube = is_found ? owned(cudd.one(manager)) : NULL;
+    for (int level = cudd.size(manager) - 1; cube != NULL && level >= 0; level--) {
+        if (level < highest || level > lowest) {
+            DdNode *variable = cudd.variable(manager, cudd.index_at(manager, level));
+            cube = instead(manager, cube, conjunction(manager, cube, variable));
+        }
+    }
+    DdNode *found = cube == NULL ? NULL : owned(cudd.and_exist(manager, care, cudd.one(manager), cube));
+    drop(manager, cube);
+    return found;
+}
+
 static DdNode *restricted(DdManager *manager, Table *known, DdNode *f, DdNode *care) {
     DdNode *one = cudd.one(manager);
     if (regular(f) == one || regular(care) == one) {
@@ -637,7 +772,9 @@ PyObject *diagram_restrict(PyObject *module, PyObject *arguments) {
         return NULL;
     }
     DdManager *manager = manager_of(bdd);
-    DdNode *found = restricted(manager, &known, (DdNode *)(uintptr_t)f, (DdNode *)(uintptr_t)care);
+    DdNode *matters = relevant(manager, (DdNode *)(uintptr_t)f, (DdNode *)(uintptr_t)care);
+    DdNode *found = matters == NULL ? NULL : restricted(manager, &known, (DdNode *)(uintptr_t)f, matters);
+    drop(manager, matters);
     free_table(manager, &known);
     return passed(found);
 }

@@ -5,15 +5,19 @@ ICCAD 1990, pp. 126-129 (restrict); R. E. Bryant, "Graph-based algorithms for Bo
 IEEE Trans. Computers C-35(8), 1986, pp. 677-691 (counting).
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import math
+from collections.abc import Callable, Container, Mapping, Sequence
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from robosc.dd_modules import load_dd
 from robosc.oxidd_diagrams import OxiddManager, Predicate
 from robosc.synthesis.compiled import kernel_of
 from robosc.synthesis.engines import Manager, is_compiled, is_reordering
 from robosc.synthesis.walks import Nodes, walked
+
+MATES = 8
+"""Known nodes with which one that a step may have made is compared."""
 
 _SMALL = 100
 """Nodes up to which a predicate is small."""
@@ -168,35 +172,70 @@ def regular(predicate: Any) -> Any:
     return ~predicate if predicate.negated else predicate
 
 
-def children(predicate: Any) -> Sequence[Any]:
-    """Return the predicates below a node: none below a constant."""
-    return () if predicate.var is None else (predicate.low, predicate.high)
+class Viewed(NamedTuple):
+    """A node as a walk over several engines' predicates sees it; it stands for a predicate and its complement.
+
+    Attributes:
+        level: Its level; that of constants is beyond all.
+        branches: The predicates where its variable is false and true; none of a constant.
+    """
+
+    node: Any
+    level: float
+    branches: Sequence[Any]
 
 
-def nodes_made(
-    known: Any,
-    *found: Any,
-    node_of: Callable[[Any], Any] = regular,
-    below: Callable[[Any], Iterable[Any]] = children,
-) -> int:
-    """Return the number of nodes of some predicates that another one does not have.
+def viewed(predicate: Any) -> Viewed:
+    """Return the node of a predicate of dd."""
+    node = regular(predicate)
+    return Viewed(node, math.inf, ()) if node.var is None else Viewed(node, node.level, (node.low, node.high))
+
+
+def nodes_made(found: Any, known: Any, touched: Container[float], view: Callable[[Any], Viewed] = viewed) -> int:
+    """Return the number of nodes that a step has made, as far as a walk finds that costs no more than they did.
+
+    A node is known where it stands, or where one would get to by other values of the variables that the step touches:
+    what is there too is not counted. Of such places no more than some are kept, so that nodes of states that the step
+    has put elsewhere may be counted as made.
 
     Args:
-        known: The other one.
-        found: The predicates.
-        node_of: Function that returns the same for a predicate and its complement.
-        below: Function that returns what is below that.
+        found: The states after the step.
+        known: Those before it.
+        touched: Levels of the variables that the step reads or changes.
+        view: Function that returns the node of a predicate.
     """
-    seen = set[Any]()
-    before = 0
-    for predicates in ([known], list(found)):
-        before = len(seen)
-        while predicates:
-            node = node_of(predicates.pop())
-            if node not in seen:
-                seen.add(node)
-                predicates += below(node)
-    return len(seen) - before
+    seen, waiting = set[Any](), [(found, [view(known)])]
+    while waiting:
+        predicate, mates = waiting.pop()
+        node, level, branches = view(predicate)
+        if not branches or _is_known(node, level, mates, view) or node in seen:
+            continue
+        seen.add(node)
+        for branch in (1, 0):
+            below: list[Viewed] = []
+            for side in (branch, 1 - branch) if level in touched else (branch,):
+                for mate in mates:
+                    _add_mate(below, view(mate.branches[side]) if mate.level == level else mate)
+            waiting.append((branches[branch], below))
+    return len(seen)
+
+
+def _is_known(node: Any, level: float, mates: list[Viewed], view: Callable[[Any], Viewed]) -> bool:
+    """Follow what is known down to the level of a node, and return True if the node is part of it."""
+    # The list grows meanwhile.
+    for place, _ in enumerate(mates):
+        while mates[place].level < level:
+            low, high = mates[place].branches
+            mates[place] = view(low)
+            _add_mate(mates, view(high))
+        if mates[place].node == node:
+            return True
+    return False
+
+
+def _add_mate(mates: list[Viewed], mate: Viewed) -> None:
+    if len(mates) < MATES and all(mate.node != other.node for other in mates):
+        mates.append(mate)
 
 
 def without(manager: Manager, states: Any, cubes: Sequence[Any]) -> Any:
@@ -242,6 +281,8 @@ def restrict(manager: Manager, node: Any, care: Any) -> Any:
     kernel = kernel_of(manager)
     if kernel is not None:
         return kernel.restrict(node, care)
+    if isinstance(manager, OxiddManager):
+        care = manager.relevant(node, care)
     return walked(manager, lambda nodes: nodes.predicate(_Restrict(nodes).walk(nodes.node(node), nodes.node(care))))
 
 

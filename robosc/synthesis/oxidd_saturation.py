@@ -5,14 +5,15 @@ rebuilt into a larger one meanwhile, by this work or by another strategy on the 
 is known for certain, and nothing is counted or reported until the work is as far as it was.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from robosc.oxidd_diagrams import BCDDFunction, BooleanOperator, OxiddManager, Predicate
 from robosc.synthesis.image import Image
 from robosc.synthesis.monitor import ProgressMonitor
-from robosc.synthesis.nodes import nodes_made
-from robosc.synthesis.saturation import LONGEST, NODES_OF_A_LOOK, PAUSE, Saturation
+from robosc.synthesis.nodes import Viewed, nodes_made
+from robosc.synthesis.saturation import PAUSE, Saturation
 from robosc.synthesis.step import Step
 
 _AND = BooleanOperator.AND
@@ -40,6 +41,7 @@ class _Prepared(NamedTuple):
     called: Any
     outside: BCDDFunction | None
     room: BCDDFunction | None
+    touched: frozenset[int]
 
 
 class OxiddSaturation(Saturation):
@@ -72,7 +74,7 @@ class OxiddSaturation(Saturation):
 
     def _begun(self, states: Predicate, until: Predicate | None) -> tuple[BCDDFunction, BCDDFunction | None]:
         """Begin, or begin anew: return the functions of predicates."""
-        self._replayed, self._taken, self._next = max(self._replayed, self._taken), 0, 0
+        self._replayed, self._taken = max(self._replayed, self._taken), 0
         self._known.clear()
         self._begin()
         return states.function, None if until is None else until.function
@@ -87,7 +89,9 @@ class OxiddSaturation(Saturation):
         self._no = manager.false.function
         self._end = len(self._groups)
         self._inside = self._within.function
-        self._prepared = [(top, [_prepared(manager, step) for step in steps]) for top, steps in self._groups]
+        self._prepared = [
+            (top, [_prepared(manager, step, self._levels) for step in steps]) for top, steps in self._groups
+        ]
 
     def _of_function(self, states: BCDDFunction, until: BCDDFunction | None) -> BCDDFunction:
         _, topmost = self._prepared[0]
@@ -140,17 +144,15 @@ class OxiddSaturation(Saturation):
 
     def _more(self, states: BCDDFunction, within: BCDDFunction, step: _Prepared) -> BCDDFunction:
         self._before(states)
-        added = self._added(states, within, step)
-        more = states | added
-        if self._taken >= self._next:
-            self._made = nodes_made(states, added, more, node_of=_regular, below=_below)
-            self._next = self._taken + min(PAUSE + states.node_count() // NODES_OF_A_LOOK, LONGEST)
+        more = states | self._added(states, within, step)
+        if self._taken % PAUSE == 0:
+            self._made = nodes_made(more, states, step.touched, _viewed)
         self._taken += 1
         return more
 
     def _added(self, states: BCDDFunction, within: BCDDFunction, step: _Prepared) -> BCDDFunction:
         new, no = states, self._no
-        inside, needed, fixed, moved, relation, hidden, called, outside, room = step
+        inside, needed, fixed, moved, relation, hidden, called, outside, room, _ = step
         if room is not None and (within & room & ~states) == no:
             return states
         if inside is not None:
@@ -182,16 +184,14 @@ class OxiddSaturation(Saturation):
             self._report(Predicate(self._oxidd, states))
 
 
-def _regular(function: BCDDFunction) -> BCDDFunction:
-    """Return the one of a function and its complement that stands for their node."""
-    return min(function, ~function)
+def _viewed(function: BCDDFunction) -> Viewed:
+    # The same one of a function and its complement stands for both.
+    node = min(function, ~function)
+    level, below = node.node_level(), node.cofactors()
+    return Viewed(node, math.inf, ()) if level is None or below is None else Viewed(node, level, below[::-1])
 
 
-def _below(function: BCDDFunction) -> Iterable[BCDDFunction]:
-    return function.cofactors() or ()
-
-
-def _prepared(manager: OxiddManager, step: Step) -> _Prepared:
+def _prepared(manager: OxiddManager, step: Step, levels: Mapping[str, int]) -> _Prepared:
     image: Image = step.add  # type: ignore[assignment]  # closure_under has looked
 
     def function(predicate: Any) -> BCDDFunction | None:
@@ -219,4 +219,5 @@ def _prepared(manager: OxiddManager, step: Step) -> _Prepared:
         called=manager.substitution(image.names) if image.names else None,
         outside=outside,
         room=function(step.room),
+        touched=frozenset(levels[name] for name in step.names),
     )

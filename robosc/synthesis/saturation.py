@@ -25,13 +25,7 @@ from robosc.synthesis.nodes import cofactors, nodes_made
 from robosc.synthesis.step import Step, is_enough
 
 PAUSE = 16
-"""Steps after which work is counted, and after which one step at most is looked at to estimate what the others cost."""
-
-NODES_OF_A_LOOK = 4
-"""Nodes of the states for which a look is put off by a step: to go through them takes as long as some steps."""
-
-LONGEST = 64
-"""Steps after which one is looked at in any case: they may have come to make far more nodes than the last one."""
+"""Steps after which work is counted, and of which the first one is looked at to estimate what the others cost."""
 
 _STEP_NODES = 10
 """Nodes that a step counts for beside those that it makes: what it finds in caches takes about as long."""
@@ -84,12 +78,13 @@ class Saturation:
         self._variables = {level: manager.var(name) for name, level in levels.items()}
         self._within = within
         self._monitor = monitor
+        self._levels = levels
         self._groups = _grouped(levels, steps)
         self._count = sum(len(group) for _, group in self._groups)
         allow_depth(len(levels) + len(self._groups), _FRAMES_PER_LEVEL)
         self._known: dict[tuple[Any, Any, int], Any] = {}
         self._phase = ""
-        self._taken = self._reports = self._spent = self._next = self._made = 0
+        self._taken = self._reports = self._spent = self._made = 0
 
     def of(self, states: Any, phase: str, until: Any = None) -> Any:
         """Return `states` and all that steps from them add.
@@ -102,7 +97,7 @@ class Saturation:
         """
         if not self._groups:
             return states
-        self._taken = self._reports = self._spent = self._next = self._made = 0
+        self._taken = self._reports = self._spent = self._made = 0
         self._phase = phase
         states = self._of_whole(states, until)
         self._spend()
@@ -154,15 +149,14 @@ class Saturation:
 
     def _grown(self, states: Any, within: Any, step: Step) -> Any:
         self._monitor.check_stop()
-        if self._taken % PAUSE == 0:
+        is_looked_at = self._taken % PAUSE == 0
+        if is_looked_at:
             self._spend()
         if self._taken + 1 >= (self._reports + 1) * self._count:
             self._report(states)
-        added = step.added(states, within)
-        grown = states | added
-        if self._taken >= self._next:
-            self._made = nodes_made(states, added, grown)
-            self._next = self._taken + min(PAUSE + states.dag_size // NODES_OF_A_LOOK, LONGEST)
+        grown = states | step.added(states, within)
+        if is_looked_at:
+            self._made = nodes_made(grown, states, {self._levels[name] for name in step.names})
         self._taken += 1
         return grown
 
@@ -243,6 +237,7 @@ class CompiledSaturation:
         manager = self._manager
         constants = manager.cube(image.constants) if image.constants else None
         hidden = manager.cube(dict.fromkeys(image.hidden, True)) if image.hidden else None
+        touched = manager.cube(dict.fromkeys(step.names, True))
         names = {name: manager.var(new) for name, new in image.names.items()}
         address = self._kernel.address
         passed = (
@@ -255,8 +250,9 @@ class CompiledSaturation:
             self._substitutions(names),
             address(image.outside),
             address(step.room),
+            address(touched),
         )
-        return passed, (constants, hidden, *names.values())
+        return passed, (touched, constants, hidden, *names.values())
 
     def _substitutions(self, functions: Mapping[str, Any]) -> tuple[tuple[int, int], ...]:
         # The manager keeps its variables.

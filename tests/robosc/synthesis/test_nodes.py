@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc.synthesis.engines import make_manager
-from robosc.synthesis.nodes import cofactors, count_models, met, renamed, restrict
+from robosc.synthesis.nodes import cofactors, count_models, met, nodes_made, regular, renamed, restrict
 from support.effort import examples
 
 NAMES = tuple(f"x{number}" for number in range(6))
@@ -140,3 +140,31 @@ def test_counting_is_exact_beyond_a_double() -> None:
     node = manager.var("y0")
     assert count_models(manager, node, names) == 2**199
     assert count_models(manager, node | manager.var("y199"), names) == 2**199 + 2**198
+
+
+def nodes_of(predicate: Any) -> set[Any]:
+    node = regular(predicate)
+    return set() if node.var is None else {node} | nodes_of(node.low) | nodes_of(node.high)
+
+
+@settings(max_examples=examples(60))
+@given(before=formulas, more=formulas, touched=st.frozensets(st.integers(0, len(NAMES) - 1)))
+def test_no_node_that_was_made_is_missed_and_few_others_are_counted(
+    manager: Any, before: Any, more: Any, touched: frozenset[int]
+) -> None:
+    known = build(manager, before)
+    found = known | build(manager, more)
+    made = nodes_made(found, known, touched)
+    assert len(nodes_of(found) - nodes_of(known)) <= made <= len(nodes_of(found))
+    assert nodes_made(known, known, touched) == 0
+
+
+def test_what_a_step_has_only_moved_is_not_counted(manager: Any) -> None:
+    moved, *others = map(manager.var, NAMES)
+    rest = others[0] & others[1] | others[2] & others[3]
+    known = moved & rest
+    found = known | ~moved & rest
+    assert nodes_made(found, known, {moved.level}) == 0
+    assert nodes_made(~moved & rest, known, {moved.level}) == 1
+    # If the step does not touch the variable, nothing says that what is on its other side was there.
+    assert nodes_made(~moved & rest, known, ()) > 1
